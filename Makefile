@@ -66,7 +66,8 @@ docs: setup ## the pages of docs/ with the reference of the code, as HTML in out
 	@$(BIN)/python -m sphinx -q -W --keep-going -b html docs out/docs
 
 .PHONY: lint
-lint: setup ## ruff
+lint: setup ## ruff: the layout of every line, and likely mistakes
+	@$(BIN)/ruff format --check --quiet . || { echo "make format lays these files"; $(BIN)/ruff format --check .; exit 1; }
 	@$(BIN)/ruff check .
 
 .PHONY: types
@@ -94,7 +95,8 @@ deep: setup ## the test suite with long property searches, and the kit on sound 
 	@IAPB_HYPOTHESIS_PROFILE=deep $(BIN)/python -m pytest -n $(PYTEST_WORKERS) --dist load -q -m '' $(PYTEST_ARGS)
 
 .PHONY: format
-format: setup ## let ruff repair what it can
+format: setup ## let ruff lay every line, and repair what it can
+	@$(BIN)/ruff format .
 	@$(BIN)/ruff check --fix .
 
 .PHONY: packages

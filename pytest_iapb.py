@@ -1,11 +1,12 @@
-"""pytest plugin: one test per law for an impact resolver. It imports this project only if a test uses it.
+"""pytest plugin: one test per law for an impact resolver. It imports this project only if a test
+uses it.
 
-    import pytest
-    from my_solver import resolve
+import pytest
+from my_solver import resolve
 
-    @pytest.mark.iapb(contract="unilateral")
-    def test_resolve(iapb_law):
-        iapb_law(resolve)
+@pytest.mark.iapb(contract="unilateral")
+def test_resolve(iapb_law):
+    iapb_law(resolve)
 """
 
 from __future__ import annotations
@@ -17,8 +18,10 @@ from typing import Any
 import pytest
 
 IMPACTS = 1000  # for each law, unless the marker or --iapb-impacts gives another number
-_MARKER = ("iapb(contract='equality', laws=None, impacts=1000, **options): what `iapb_law` judges by; "
-           "options as of verification.check_passivity")  # fmt: skip
+_MARKER = (
+    "iapb(contract='equality', laws=None, impacts=1000, **options): what `iapb_law` judges by; "
+    "options as of verification.check_passivity"
+)
 
 
 def _at_least(least: int) -> Callable[[str], int]:
@@ -34,8 +37,15 @@ def _at_least(least: int) -> Callable[[str], int]:
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options for the number of impacts and the seed."""
     group = parser.getgroup("iapb", "laws of impact resolvers")
-    group.addoption("--iapb-impacts", type=_at_least(1), metavar="N", help=f"random impacts for each law [{IMPACTS}]")
-    group.addoption("--iapb-seed", type=_at_least(0), default=0, metavar="N", help="seed of the impacts [0]")
+    group.addoption(
+        "--iapb-impacts",
+        type=_at_least(1),
+        metavar="N",
+        help=f"random impacts for each law [{IMPACTS}]",
+    )
+    group.addoption(
+        "--iapb-seed", type=_at_least(0), default=0, metavar="N", help="seed of the impacts [0]"
+    )
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -56,7 +66,9 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     from iapb.errors import IapbError
     from iapb.lazy import needed
 
-    asked = {"contract": "equality", "laws": None, "unequal_restitution": False} | _asked(metafunc.definition)
+    asked = {"contract": "equality", "laws": None, "unequal_restitution": False} | _asked(
+        metafunc.definition
+    )
     try:
         kit = needed("verification.laws.kit", "The fixture iapb_law")
         laws = kit.choose_laws(asked["contract"], asked["laws"], asked["unequal_restitution"])
@@ -67,7 +79,8 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 @pytest.fixture
 def iapb_law(request: pytest.FixtureRequest) -> Callable[[Callable[..., Any]], None]:
-    """Return a function that tests a resolver against one law and fails the test with a shrunk counterexample."""
+    """Return a function that tests a resolver against one law and fails the test with a shrunk
+    counterexample."""
     from verification import check_passivity
 
     asked = {"impacts": IMPACTS} | _asked(request.node) | {"laws": [request.param]}

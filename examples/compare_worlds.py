@@ -1,4 +1,5 @@
-"""Your own scene in several worlds: distance from the ideal world, time per step and energy of each.
+"""Your own scene in several worlds: distance from the ideal world, time per step and energy of
+each.
 
 Run it: python examples/compare_worlds.py   (on the command line: iapb compare slope.yaml)
 """

@@ -1,4 +1,5 @@
-"""The numbers behind Figure 7: the distance of each world from the ideal world, and the figure as SVG.
+"""The numbers behind Figure 7: the distance of each world from the ideal world, and the figure as
+SVG.
 
 Run it: python examples/figure_of_the_paper.py
 """
@@ -13,5 +14,7 @@ scene = load_scene(find_scene("peg_corner"))
 ideal = run_world(scene, "ideal")
 for world in ("IAPB", "PB"):
     away = np.abs(run_world(scene, world).q - ideal.q).max(axis=0)
-    print(f"{world:<5} is at most {1e3 * away[0]:.2f} mm (x) and {1e3 * away[1]:.2f} mm (y) from the ideal world")
+    print(
+        f"{world:<5} is at most {1e3 * away[0]:.2f} mm (x) and {1e3 * away[1]:.2f} mm (y) from the ideal world"
+    )
 main(["reproduce", "--figure", "fig07", "--out", "figures"])  # writes figures/fig07.svg

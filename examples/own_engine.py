@@ -1,7 +1,9 @@
-"""An engine of one's own as a world: springs at every contact, for any scene without friction and loss.
+"""An engine of one's own as a world: springs at every contact, for any scene without friction and
+loss.
 
 Run it: python examples/own_engine.py
-Also, in this folder: iapb verify --world own_engine:Springs; iapb compare two_discs --worlds own_engine:Springs,ideal
+Also, in this folder: iapb verify --world own_engine:Springs; iapb compare two_discs --worlds
+own_engine:Springs,ideal
 """
 
 from collections.abc import Callable
@@ -38,7 +40,8 @@ class Springs:
         steps: int | None = None,
         progress: Callable[[int, int], None] | None = None,
     ) -> Run:
-        """Take ten substeps of semi-implicit Euler in each step: first v changes, then q moves by the new v."""
+        """Take ten substeps of semi-implicit Euler in each step: first v changes, then q moves by
+        the new v."""
         system = System(scene)
         mechanism = system.mechanism
         substeps = self.settings["substeps"]

@@ -1,4 +1,5 @@
-"""Your own contact law beside the engine's: an impulse stops every approaching contact in each step.
+"""Your own contact law beside the engine's: an impulse stops every approaching contact in each
+step.
 
 Run it: python examples/own_law.py
 """
@@ -22,7 +23,8 @@ class ImpulsesOnly:
     settings: dict[str, Any] = field(default_factory=dict)
 
     def advance(self, system: Any, state: Any, applied_force: np.ndarray, dt: float) -> StepResult:
-        """One semi-implicit step of length dt [s] from (q, v) under a constant generalised force."""
+        """One semi-implicit step of length dt [s] from (q, v) under a constant generalised
+        force."""
         mechanism, q = system.mechanism, state.q
         force = applied_force - mechanism.bias(q, state.v) - mechanism.gravity(q, system.gravity)
         mass = mechanism.mass_matrix(q)
@@ -31,11 +33,19 @@ class ImpulsesOnly:
         impact = resolve_impact(mass, rows.jacobian[rows.gamma < 0.0], v, 0.0)
         hit = COLLIDING if np.any(rows.gamma < 0.0) else FREE
         zero = np.zeros_like(v)
-        return StepResult(mechanism.integrate(q, impact.velocity, dt), impact.velocity, zero, zero,
-                          impact.generalized_impulse, hit)  # fmt: skip
+        return StepResult(
+            mechanism.integrate(q, impact.velocity, dt),
+            impact.velocity,
+            zero,
+            zero,
+            impact.generalized_impulse,
+            hit,
+        )
 
 
 scene = find_scene("peg_corner")
 for law in (None, ImpulsesOnly()):
     run = simulate(scene, law=law, steps=512)
-    print(f"{run.law:<30} the peg is at x = {1e3 * run.q[-1, 0]:.3f} mm, y = {1e3 * run.q[-1, 1]:.3f} mm")
+    print(
+        f"{run.law:<30} the peg is at x = {1e3 * run.q[-1, 0]:.3f} mm, y = {1e3 * run.q[-1, 1]:.3f} mm"
+    )

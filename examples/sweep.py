@@ -1,4 +1,5 @@
-"""One scene with many values: the deepest penetration over the stiffness, with and without impulses.
+"""One scene with many values: the deepest penetration over the stiffness, with and without
+impulses.
 
 Run it: python examples/sweep.py
 """

@@ -8,7 +8,8 @@ import pytest
 
 
 def my_resolver(mass_matrix, contact_jacobian, velocity, restitution):
-    """Newton's law as a linear complementarity problem for one row at a time, repeated until nothing approaches."""
+    """Newton's law as a linear complementarity problem for one row at a time, repeated until
+    nothing approaches."""
     J, v, p = contact_jacobian, np.array(velocity), np.zeros(len(contact_jacobian))
     away = np.linalg.solve(mass_matrix, J.T)  # M⁻¹ Jᵀ
     wanted = -restitution * J @ velocity
@@ -16,7 +17,11 @@ def my_resolver(mass_matrix, contact_jacobian, velocity, restitution):
         before = v.copy()
         for i, row in enumerate(J):
             stiffness = row @ away[:, i]
-            step = max(p[i] + (wanted[i] - row @ v) / stiffness, 0.0) - p[i] if stiffness > 0.0 else 0.0
+            step = (
+                max(p[i] + (wanted[i] - row @ v) / stiffness, 0.0) - p[i]
+                if stiffness > 0.0
+                else 0.0
+            )
             p[i] += step
             v += step * away[:, i]
         if np.array_equal(v, before):

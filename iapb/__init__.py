@@ -46,16 +46,31 @@ if TYPE_CHECKING:
 _HOME = {
     "iapb.advice.certificate": ("Certificate", "certify", "certify_impacts"),
     "iapb.advice.checks": ("check_scene",),
-    "iapb.contact.impact": ("FrictionalImpact", "Impact", "Impacts", "resolve_frictional_impact", "resolve_impact",
-                            "resolve_impacts"),
+    "iapb.contact.impact": (
+        "FrictionalImpact",
+        "Impact",
+        "Impacts",
+        "resolve_frictional_impact",
+        "resolve_impact",
+        "resolve_impacts",
+    ),
     "iapb.advice.effects": ("Effect", "decide_effects"),
-    "iapb.errors": ("ArgumentError", "IapbError", "MissingDependencyError", "RangeError", "RunFileError", "SceneError",
-                    "SolverError"),
+    "iapb.errors": (
+        "ArgumentError",
+        "IapbError",
+        "MissingDependencyError",
+        "RangeError",
+        "RunFileError",
+        "SceneError",
+        "SolverError",
+    ),
     "iapb.mechanics.mechanism": ("Body", "Joint", "Mechanism"),
     "iapb.run": ("Run",),
     "iapb.scene": ("Scene", "find_scene", "load_scene", "scene_folder"),
     "iapb.simulation": ("Simulation", "simulate"),
-    "verification": ("check_passivity",),  # of an upper package, for users; the engine itself never imports one
+    "verification": (
+        "check_passivity",
+    ),  # of an upper package, for users; the engine itself never imports one
 }
 
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}

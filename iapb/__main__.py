@@ -1,6 +1,7 @@
 """Start the command `iapb`, also as `python -m iapb`, or say which package is missing or hidden.
 
-This module is in the package `iapb` because a folder `reports` of the user may hide the package `reports`.
+This module is in the package `iapb` because a folder `reports` of the user may hide the package
+`reports`.
 """
 
 import sys
@@ -10,7 +11,8 @@ from iapb.lazy import needed
 
 
 def main() -> int:
-    """Run the command; if a package is missing or hidden by another one, print one sentence that says how to fix it."""
+    """Run the command; if a package is missing or hidden by another one, print one sentence that
+    says how to fix it."""
     try:
         command = needed("reports.cli", "The command")
     except IapbError as error:

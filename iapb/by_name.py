@@ -12,7 +12,9 @@ from iapb.errors import ArgumentError
 from iapb.names import nearest
 
 
-def function_named(argument: str, name: str, form: str = "package.module:function") -> Callable[..., Any]:
+def function_named(
+    argument: str, name: str, form: str = "package.module:function"
+) -> Callable[..., Any]:
     """Import a function like `object_named`."""
     function: Callable[..., Any] = object_named(argument, name, form)
     if not callable(function):
@@ -23,7 +25,8 @@ def function_named(argument: str, name: str, form: str = "package.module:functio
 def object_named(argument: str, name: str, form: str) -> Any:
     """Import an object, also from the working directory; raise ArgumentError if that fails.
 
-    argument : the command-line option that the name was given for; form : the expected form of the name
+    argument : the command-line option that the name was given for; form : the expected form of the
+        name
     """
     module, colon, attribute = name.partition(":")
     if not (module and colon and attribute):
@@ -38,5 +41,7 @@ def object_named(argument: str, name: str, form: str) -> Any:
     if not hasattr(home, attribute):
         near = nearest(attribute, [word for word in dir(home) if not word.startswith("_")])
         guess = f"; did you mean {near}?" if near else ""
-        raise ArgumentError(argument, name, f"a name of the module {module}, which has no {attribute}{guess}")
+        raise ArgumentError(
+            argument, name, f"a name of the module {module}, which has no {attribute}{guess}"
+        )
     return getattr(home, attribute)

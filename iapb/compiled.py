@@ -1,14 +1,17 @@
 """Compile kernels, and pass nested tuples of arrays to them as one pointer.
 
-`kernel` compiles with numba, caches on disk, uses no fastmath and *no allocator*: `_nrt=False` leaves out the memory
-runtime, so a kernel that would allocate does not compile. The compiler thus checks that kernels do not allocate.
+`kernel` compiles with numba, caches on disk, uses no fastmath and *no allocator*: `_nrt=False`
+leaves out the memory runtime, so a kernel that would allocate does not compile. The compiler thus
+checks that kernels do not allocate.
 
-`block` passes a NamedTuple or dict of arrays, also a nested one, to kernels as one pointer. Numba passes a tuple member
-by member, some 1,300 numbers for a whole world; a step then took 150 s to compile and 60 µs to run. With a pointer it
-takes a tenth of the compile time and a hundredth of the run time. In Python a block has the attributes of its content.
+`block` passes a NamedTuple or dict of arrays, also a nested one, to kernels as one pointer. Numba
+passes a tuple member by member, some 1,300 numbers for a whole world; a step then took 150 s to
+compile and 60 µs to run. With a pointer it takes a tenth of the compile time and a hundredth of the
+run time. In Python a block has the attributes of its content.
 
-Only what a scene calls for is compiled: a flag that is off (`flag`) is part of a block's type, and kernels that need it
-are replaced by a constant. `IAPB_COMPILE=whole` compiles everything once for all scenes, which many scenes share.
+Only what a scene calls for is compiled: a flag that is off (`flag`) is part of a block's type, and
+kernels that need it are replaced by a constant. `IAPB_COMPILE=whole` compiles everything once for
+all scenes, which many scenes share.
 """
 
 from __future__ import annotations
@@ -48,16 +51,22 @@ _READ_BY_KERNELS = ("compiled.py", "inlining.py", "run.py", "joints.py", "arrays
 
 def _stamped_files() -> list[Path]:
     """All files of the engine whose text decides what is compiled."""
-    return [path for path in sorted(Path(__file__).parent.rglob("*.py"))
-            if path.name in _READ_BY_KERNELS or b"@kernel" in path.read_bytes()]
+    return [
+        path
+        for path in sorted(Path(__file__).parent.rglob("*.py"))
+        if path.name in _READ_BY_KERNELS or b"@kernel" in path.read_bytes()
+    ]
 
 
 # Numba alone would keep a cached kernel after a change of a kernel that it calls.
-_STAMP = hashlib.sha256(b"\0".join(b"%s %s" % (path.name.encode(), path.read_bytes()) for path in _stamped_files()))
+_STAMP = hashlib.sha256(
+    b"\0".join(b"%s %s" % (path.name.encode(), path.read_bytes()) for path in _stamped_files())
+)
 
 
 def _stamp_of(function: Callable[..., Any]) -> str:
-    """Hash the files that a kernel depends on: those of the engine, and its own file if that lies elsewhere."""
+    """Hash the files that a kernel depends on: those of the engine, and its own file if that lies
+    elsewhere."""
     path, digest = Path(inspect.getfile(function)), _STAMP.copy()
     if not path.is_relative_to(Path(__file__).parent):
         digest.update(path.read_bytes())
@@ -65,15 +74,19 @@ def _stamp_of(function: Callable[..., Any]) -> str:
 
 
 def flag(on: bool) -> Any:
-    """Return the value of a flag in a block; kernels that need a flag which is off, None, are not compiled."""
+    """Return the value of a flag in a block; kernels that need a flag which is off, None, are not
+    compiled."""
     return True if on else False if os.environ.get("IAPB_COMPILE") == "whole" else None
 
 
-def kernel(function: Callable[..., Any] | None = None, *, needs: str = "", otherwise: Any = None) -> Any:
-    """Compile a function as a kernel (see the module's docstring), cached until a file with kernels changes.
+def kernel(
+    function: Callable[..., Any] | None = None, *, needs: str = "", otherwise: Any = None
+) -> Any:
+    """Compile a function as a kernel (see the module's docstring), cached until a file with kernels
+    changes.
 
-    needs : flags (see `flag`), separated by blanks; if all are off in a block among the arguments, kernels that call
-        this one get the constant `otherwise` in its place
+    needs : flags (see `flag`), separated by blanks; if all are off in a block among the arguments,
+        kernels that call this one get the constant `otherwise` in its place
     """
     if function is None:
         return partial(kernel, needs=needs, otherwise=otherwise)
@@ -82,24 +95,33 @@ def kernel(function: Callable[..., Any] | None = None, *, needs: str = "", other
     flags = frozenset(needs.split())
 
     def is_absent(kinds: Sequence[types.Type]) -> bool:
-        return bool(flags) and any(isinstance(kind, BlockType) and flags <= kind.absent for kind in kinds)
+        return bool(flags) and any(
+            isinstance(kind, BlockType) and flags <= kind.absent for kind in kinds
+        )
 
     compiled = compile_as_whole(function, is_absent, otherwise, fastmath=False, _nrt=False)
     try:
         compiled.enable_caching()
     except RuntimeError:  # no cache folder is writable, for example in a system-wide installation
-        warnings.warn("kernels are compiled anew in each process, half a minute: neither the package's folder nor the "
-                      "user's cache can be written; NUMBA_CACHE_DIR names one that can", stacklevel=1)  # fmt: skip
+        warnings.warn(
+            "kernels are compiled anew in each process, half a minute: neither the package's "
+            "folder nor the "
+            "user's cache can be written; NUMBA_CACHE_DIR names one that can",
+            stacklevel=1,
+        )
         return compiled
-    compiled._cache._cache_file._source_stamp = _stamp_of(function)  # numba has no public way to say this
+    compiled._cache._cache_file._source_stamp = _stamp_of(
+        function
+    )  # numba has no public way to say this
     return compiled
 
 
 class Entry:
     """A kernel that Python calls again and again with arguments of one set of types.
 
-    Numba looks up the type of each argument at each call, which takes about 5 µs for a block. An Entry does so only at
-    its first call. The caller must keep the dtype, dimensions and layout of all arrays.
+    Numba looks up the type of each argument at each call, which takes about 5 µs for a block. An
+    Entry does so only at its first call. The caller must keep the dtype, dimensions and layout of
+    all arrays.
     """
 
     def __init__(self, function: Any) -> None:
@@ -115,7 +137,9 @@ class Entry:
 
     def taking(self, *examples: Any) -> Callable[..., Any]:
         """Return the machine code's own Python function for arguments of these types."""
-        return self._function if config.DISABLE_JIT else _code(self._function, *map(_kind, examples))
+        return (
+            self._function if config.DISABLE_JIT else _code(self._function, *map(_kind, examples))
+        )
 
 
 @cache  # numba takes 30 µs to find the code again
@@ -131,7 +155,8 @@ def _code(function: Any, *kinds: types.Type) -> Any:
 
 @kernel
 def copy_into(target, source):
-    """Do target[:] = source for vectors of equal length; a slice assignment might make a hidden copy."""
+    """Do target[:] = source for vectors of equal length; a slice assignment might make a hidden
+    copy."""
     for k in range(target.shape[0]):
         target[k] = source[k]
 
@@ -140,15 +165,18 @@ OFF = typeof(None)  # type of a flag that is off
 
 
 class BlockType(types.Type):
-    """Numba's type of a block: its fields, each with its type and its place (in words of 8 bytes); its absent flags."""
+    """Numba's type of a block: its fields, each with its type and its place (in words of 8 bytes);
+    its absent flags."""
 
     def __init__(self, name: str, fields: dict[str, types.Type]) -> None:
         self.fields, kinds = fields, fields.values()
         self.places = dict(zip(fields, accumulate(map(_words, kinds), initial=0), strict=False))
         self.absent: frozenset[str] = frozenset(
-            name for name, kind in fields.items() if kind is OFF).union(
-            *(kind.absent for kind in kinds if isinstance(kind, BlockType)))
-        content = repr(list(fields.items())).encode()  # its hash, for numba writes the name into those of functions
+            name for name, kind in fields.items() if kind is OFF
+        ).union(*(kind.absent for kind in kinds if isinstance(kind, BlockType)))
+        content = repr(
+            list(fields.items())
+        ).encode()  # its hash, for numba writes the name into those of functions
         super().__init__(f"{name}_{hashlib.blake2b(content, digest_size=8).hexdigest()}")
 
 
@@ -158,28 +186,42 @@ def _type_of(name: str, *fields: tuple[str, types.Type]) -> BlockType:
 
 
 class Block:
-    """A NamedTuple or dict of arrays, numbers and further such content, laid out in memory for kernels.
+    """A NamedTuple or dict of arrays, numbers and further such content, laid out in memory for
+    kernels.
 
     The block refers to the arrays and keeps them alive. Numbers are copied and cannot change.
     """
 
     def __init__(self, content: Any) -> None:
         given = content if isinstance(content, dict) else content._asdict()
-        self.members = {name: block(value) if isinstance(value, dict) or hasattr(value, "_fields") else value
-                         for name, value in given.items()}
+        self.members = {
+            name: block(value) if isinstance(value, dict) or hasattr(value, "_fields") else value
+            for name, value in given.items()
+        }
         vars(self).update(self.members)
-        self.block_type = _type_of(type(content).__name__, *((k, _kind(value)) for k, value in self.members.items()))
-        self._memory = np.array([word for value in self.members.values() for word in _layout(value)], np.int64)
+        self.block_type = _type_of(
+            type(content).__name__, *((k, _kind(value)) for k, value in self.members.items())
+        )
+        self._memory = np.array(
+            [word for value in self.members.values() for word in _layout(value)], np.int64
+        )
         self.address = self._memory.ctypes.data
 
     def __reduce__(self) -> Any:
         """Refuse copy and pickle: a copy would hold the address of this block's memory."""
-        raise TypeError("compiled state cannot be copied or pickled; start another Simulation of the scene")
+        raise TypeError(
+            "compiled state cannot be copied or pickled; start another Simulation of the scene"
+        )
 
     def arrays(self) -> list[np.ndarray]:
         """Return all arrays, including those of nested blocks."""
         found = [value for value in self.members.values() if isinstance(value, np.ndarray)]
-        return found + [each for value in self.members.values() if isinstance(value, Block) for each in value.arrays()]
+        return found + [
+            each
+            for value in self.members.values()
+            if isinstance(value, Block)
+            for each in value.arrays()
+        ]
 
 
 def block(content: Any) -> Any:
@@ -187,7 +229,9 @@ def block(content: Any) -> Any:
     return content if isinstance(content, Block) else Block(content)
 
 
-_KINDS: dict[Any, types.Type] = {}  # numba takes 20 µs to find the type of an array, and a simulation has hundreds
+_KINDS: dict[
+    Any, types.Type
+] = {}  # numba takes 20 µs to find the type of an array, and a simulation has hundreds
 
 
 def _kind(value: Any) -> types.Type:
@@ -202,7 +246,8 @@ def _kind(value: Any) -> types.Type:
 
 
 def _words(kind: types.Type) -> int:
-    """Return the number of words of a field: a pointer, a number, or numba's array structure (5, shape, strides)."""
+    """Return the number of words of a field: a pointer, a number, or numba's array structure (5,
+    shape, strides)."""
     return 5 + 2 * kind.ndim if isinstance(kind, types.Array) else 1
 
 
@@ -232,7 +277,9 @@ def _unbox_block(kind: BlockType, value: Any, context: Any) -> NativeValue:
     pointer = context.pyapi.long_as_voidptr(address)
     context.pyapi.decref(address)
     is_error = cgutils.is_not_null(context.builder, context.pyapi.err_occurred())
-    return NativeValue(context.builder.bitcast(pointer, ir.IntType(64).as_pointer()), is_error=is_error)
+    return NativeValue(
+        context.builder.bitcast(pointer, ir.IntType(64).as_pointer()), is_error=is_error
+    )
 
 
 @infer_getattr

@@ -1,4 +1,5 @@
-"""Report that kernels are being compiled, which can take a minute or two. Nested listeners report it once."""
+"""Report that kernels are being compiled, which can take a minute or two. Nested listeners report
+it once."""
 
 from __future__ import annotations
 
@@ -17,7 +18,8 @@ BEGIN = "Compiling kernels (seconds to a minute or two); they are cached for the
 
 @contextmanager
 def compiling_told(say: Callable[[str], None]) -> Iterator[None]:
-    """Call say(line) when this process first compiles a kernel, and at the end with the time if it is WORTH_SAYING.
+    """Call say(line) when this process first compiles a kernel, and at the end with the time if it
+    is WORTH_SAYING.
 
     A kernel from numba's cache is not compiled and not reported.
     """
@@ -26,6 +28,7 @@ def compiling_told(say: Callable[[str], None]) -> Iterator[None]:
     if _listening:
         yield
         return
+
     def say_once() -> None:
         if not _begun:
             _begun.append(True)
@@ -43,13 +46,15 @@ def compiling_told(say: Callable[[str], None]) -> Iterator[None]:
 
 
 def to_stderr(line: str) -> None:
-    """Write a line to stderr now, if it can be written; what would give a terminal orders is escaped."""
+    """Write a line to stderr now, if it can be written; what would give a terminal orders is
+    escaped."""
     with suppress(OSError):
         print(harmless(line), file=sys.stderr, flush=True)
 
 
 def tell_from_worker(told: Any) -> None:
-    """Initialise a worker process. Of the processes that share the flag `told`, the first to compile reports it."""
+    """Initialise a worker process. Of the processes that share the flag `told`, the first to
+    compile reports it."""
     from numba.core import event
 
     def say_once() -> None:
@@ -63,7 +68,8 @@ def tell_from_worker(told: Any) -> None:
 
 
 def _listener(begin: Callable[[], None]) -> Any:
-    """Return a numba listener that calls begin() and adds up the time of compiling, in `duration` once `done`."""
+    """Return a numba listener that calls begin() and adds up the time of compiling, in `duration`
+    once `done`."""
     from numba.core.event import TimingListener
 
     class Listener(TimingListener):

@@ -1,7 +1,9 @@
-"""Double-double arithmetic for energies: a number is an unevaluated pair hi + lo of about 32 digits.
+"""Double-double arithmetic for energies: a number is an unevaluated pair hi + lo of about 32
+digits.
 
-Sources: Dekker (1971), Knuth (TAOCP 2, 4.2.2), Hida, Li and Bailey (2001). The error bounds hold as long as no
-intermediate value leaves the range of doubles; callers scale first (`iapb.contact.impact`).
+Sources: Dekker (1971), Knuth (TAOCP 2, 4.2.2), Hida, Li and Bailey (2001). The error bounds hold as
+long as no intermediate value leaves the range of doubles; callers scale first
+(`iapb.contact.impact`).
 """
 
 from __future__ import annotations
@@ -47,7 +49,8 @@ def add_product(hi, lo, a_hi, a_lo, b):
 
 @kernel
 def symmetric_entry(matrix, i, j):
-    """Return entry (i, j) of ½ (M + Mᵀ) as an exact pair, which is M[i, j] and 0 if M is symmetric."""
+    """Return entry (i, j) of ½ (M + Mᵀ) as an exact pair, which is M[i, j] and 0 if M is
+    symmetric."""
     entry, mirrored = matrix[i, j], matrix[j, i]
     if entry == mirrored:
         return entry, 0.0
@@ -56,7 +59,8 @@ def symmetric_entry(matrix, i, j):
 
 @kernel
 def quadratic_forms(mass_matrix, v, change, v_unit=1.0, change_unit=1.0):
-    """Return vᵀ M Δv and Δvᵀ M Δv of the symmetric part of M, each evaluated in double-double and rounded once.
+    """Return vᵀ M Δv and Δvᵀ M Δv of the symmetric part of M, each evaluated in double-double and
+    rounded once.
 
     v and Δv are first scaled by their units, which are powers of two.
     """
@@ -66,15 +70,20 @@ def quadratic_forms(mass_matrix, v, change, v_unit=1.0, change_unit=1.0):
         row_hi = row_lo = 0.0
         for j in range(d):
             entry_hi, entry_lo = symmetric_entry(mass_matrix, i, j)
-            row_hi, row_lo = add_product(row_hi, row_lo, entry_hi, entry_lo, change_unit * change[j])
+            row_hi, row_lo = add_product(
+                row_hi, row_lo, entry_hi, entry_lo, change_unit * change[j]
+            )
         cross_hi, cross_lo = add_product(cross_hi, cross_lo, row_hi, row_lo, v_unit * v[i])
-        square_hi, square_lo = add_product(square_hi, square_lo, row_hi, row_lo, change_unit * change[i])
+        square_hi, square_lo = add_product(
+            square_hi, square_lo, row_hi, row_lo, change_unit * change[i]
+        )
     return cross_hi + cross_lo, square_hi + square_lo
 
 
 @kernel
 def unit_of(vector):
-    """Return the power of two, at most 2^±1000, that scales the largest entry into [½, 1) or towards it."""
+    """Return the power of two, at most 2^±1000, that scales the largest entry into [½, 1) or
+    towards it."""
     largest = 0.0
     for entry in vector:
         largest = max(largest, abs(entry))
@@ -83,7 +92,8 @@ def unit_of(vector):
 
 @kernel
 def least_energy(mass_matrix, v, change):
-    """Return the α at which v + α Δv has the least energy, −vᵀMΔv / ΔvᵀMΔv; 0 if every α > 0 gains energy.
+    """Return the α at which v + α Δv has the least energy, −vᵀMΔv / ΔvᵀMΔv; 0 if every α > 0 gains
+    energy.
 
     The vectors are scaled first, so that their squares neither under- nor overflow.
     """
@@ -96,7 +106,8 @@ def least_energy(mass_matrix, v, change):
 def kinetic_energies(mass_matrix, v_minus, v_plus):
     """Return ½ v⁻ᵀ M v⁻ and ½ (v⁺ᵀ M v⁺ − v⁻ᵀ M v⁻), both in double-double, rounded once.
 
-    The difference is formed before rounding, so it is accurate even if the two energies agree in all digits.
+    The difference is formed before rounding, so it is accurate even if the two energies agree in
+    all digits.
     """
     d = v_minus.shape[0]
     before_hi = before_lo = change_hi = change_lo = 0.0

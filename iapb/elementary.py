@@ -1,8 +1,10 @@
-"""Elementary functions that return the same bits on every processor, without libm and numpy's vectorised loops.
+"""Elementary functions that return the same bits on every processor, without libm and numpy's
+vectorised loops.
 
-The C library uses different code for sin, cos and atan2 on processors with FMA, and numpy uses its own for AVX-512, so
-their last bits differ. The functions here use only +, −, ×, ÷ and √, whose rounding IEEE 754 fixes. They compute about
-70 bits and round once, so nearly every result is correctly rounded.
+The C library uses different code for sin, cos and atan2 on processors with FMA, and numpy uses its
+own for AVX-512, so their last bits differ. The functions here use only +, −, ×, ÷ and √, whose
+rounding IEEE 754 fixes. They compute about 70 bits and round once, so nearly every result is
+correctly rounded.
 """
 
 from __future__ import annotations
@@ -20,7 +22,9 @@ _FIFTH = (0.008333333333333333, 1.1564823173178714e-19)
 _SIXTH = (0.001388888888888889, -5.300543954373577e-20)
 _SEVENTH = (0.0001984126984126984, 1.7209558293420705e-22)
 
-_LARGEST_ANGLE = 2.0**30  # beyond this, doubles are 1e-7 rad apart, and the angle is first reduced by the rounded 2π
+_LARGEST_ANGLE = (
+    2.0**30
+)  # beyond this, doubles are 1e-7 rad apart, and the angle is first reduced by the rounded 2π
 _TAN_22_5_DEGREES_TERMS = 10  # of the arc tangent's series below tan(22.5°): 4e-10
 
 
@@ -37,14 +41,18 @@ def _near_zero(h, l):
     z, w = two_product(h, h)
     w += 2.0 * h * l
     tail = 1.0 / 355687428096000.0 - z * (1.0 / 121645100408832000.0)  # 1/17! − z/19!
-    tail = 1.0 / 362880.0 - z * (1.0 / 39916800.0 - z * (1.0 / 6227020800.0 - z * (1.0 / 1307674368000.0 - z * tail)))
+    tail = 1.0 / 362880.0 - z * (
+        1.0 / 39916800.0 - z * (1.0 / 6227020800.0 - z * (1.0 / 1307674368000.0 - z * tail))
+    )
     s, t = add_product(-_SEVENTH[0], -_SEVENTH[1], z, w, tail)
     s, t = _multiply_add(_FIFTH[0], _FIFTH[1], z, w, s, t)
     s, t = _multiply_add(-_THIRD[0], -_THIRD[1], z, w, s, t)
     s, t = _multiply_add(0.0, 0.0, z, w, s, t)
     s, t = _multiply_add(h, l, s, t, h, l)
     tail = 1.0 / 20922789888000.0 - z * (1.0 / 6402373705728000.0)  # 1/16! − z/18!
-    tail = 1.0 / 40320.0 - z * (1.0 / 3628800.0 - z * (1.0 / 479001600.0 - z * (1.0 / 87178291200.0 - z * tail)))
+    tail = 1.0 / 40320.0 - z * (
+        1.0 / 3628800.0 - z * (1.0 / 479001600.0 - z * (1.0 / 87178291200.0 - z * tail))
+    )
     c, d = add_product(-_SIXTH[0], -_SIXTH[1], z, w, tail)
     c, d = _multiply_add(_FOURTH[0], _FOURTH[1], z, w, c, d)
     c, d = _multiply_add(-0.5, 0.0, z, w, c, d)
@@ -82,13 +90,15 @@ def sine_cosine(angle):
 
 @kernel
 def _power_of_two(largest):
-    """Return a power of two that scales a number so that its square neither over- nor underflows."""
+    """Return a power of two that scales a number so that its square neither over- nor
+    underflows."""
     return 2.0**600 if largest < 2.0**-400 else (2.0**-600 if largest > 2.0**400 else 1.0)
 
 
 @kernel
 def arc_tangent(y, x):
-    """Return the angle [rad] in [−π, π] of the point (x, y), as math.atan2 does; the angle of (0, 0) is 0.
+    """Return the angle [rad] in [−π, π] of the point (x, y), as math.atan2 does; the angle of (0,
+    0) is 0.
 
     A series gives nine digits. One step of Newton's method on y cos a − x sin a gives the others.
     """

@@ -1,7 +1,8 @@
 """Other engines as worlds: what an engine offers, and the run of its states.
 
-An engine simulates a scene by its own method. It returns a `Run` of configurations and velocities; energies follow from
-them, in the same way for all engines. What a run of an engine lacks, such as contacts and their forces, has no rows.
+An engine simulates a scene by its own method. It returns a `Run` of configurations and velocities;
+energies follow from them, in the same way for all engines. What a run of an engine lacks, such as
+contacts and their forces, has no rows.
 """
 
 from __future__ import annotations
@@ -45,15 +46,18 @@ class Engine(Protocol):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Settings and version of the engine: plain numbers and texts, recorded in its runs and part of their keys."""
+        """Settings and version of the engine: plain numbers and texts, recorded in its runs and
+        part of their keys."""
         ...
 
     def ignored(self, scene: Scene) -> tuple[str, ...]:
-        """Return the fields of the scene that the engine ignores; a run that ignores one is not scored."""
+        """Return the fields of the scene that the engine ignores; a run that ignores one is not
+        scored."""
         ...
 
     def run(self, scene: Scene, steps: int | None = None, progress: Progress | None = None) -> Run:
-        """Simulate a scene, by default for its duration, and return the run (see `run_of_states`)."""
+        """Simulate a scene, by default for its duration, and return the run (see
+        `run_of_states`)."""
         ...
 
 
@@ -63,9 +67,11 @@ def is_engine(law: Any) -> TypeGuard[Engine]:
 
 
 def fields_of_our_engine(scene: Scene) -> tuple[str, ...]:
-    """Return the fields of a scene that other engines have nothing like: device, coupling, our own contact forces.
+    """Return the fields of a scene that other engines have nothing like: device, coupling, our own
+    contact forces.
 
-    A device counts where a hand holds the tool through it, contact forces where something can touch.
+    A device counts where a hand holds the tool through it, contact forces where something can
+    touch.
     """
     gains = scene.couplings
     coupled = scene.hand is not None and (
@@ -97,7 +103,8 @@ def run_of_states(
     ----------
     scene : Scene
     engine : Engine
-    q : (n + 1, nq) configurations at the start and at the end of each step, with the coordinates of `mechanism_of`
+    q : (n + 1, nq) configurations at the start and at the end of each step, with the coordinates of
+        `mechanism_of`
     v : (n + 1, d) velocities at the same instants; those of a free flyer are in body axes
     stopped : why the run ended early; empty if it did not
     seconds : time that the steps took [s]
@@ -155,7 +162,8 @@ def run_of_states(
 
 
 def _work_of_the_hand(scene: Scene, mechanism: Mechanism, q: Floats) -> Floats:
-    """Return the work (n,) [J] of the hand's force up to the end of each step: the sum of F · Δq."""
+    """Return the work (n,) [J] of the hand's force up to the end of each step: the sum of F ·
+    Δq."""
     forces = np.zeros((len(q) - 1, mechanism.nv))
     if scene.hand is not None:
         body = mechanism.index(scene.hand.body)

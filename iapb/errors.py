@@ -21,8 +21,11 @@ def shown(value: Any) -> str:
     return text if len(text) <= _SHOWN_CHARACTERS else text[: _SHOWN_CHARACTERS - 1] + "…"
 
 
-# Terminal control characters, and characters without a width or that change the direction of text; not tabs, line ends.
-_ORDERS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff]")
+# Terminal control characters, and characters without a width or that change the direction of text;
+# not tabs, line ends.
+_ORDERS = re.compile(
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff]"
+)
 
 
 def harmless(text: str) -> str:
@@ -33,11 +36,13 @@ def harmless(text: str) -> str:
 class IapbError(Exception):
     """Root of every error that iapb raises on purpose.
 
-    Errors can be pickled with message and attributes. An attribute that cannot be pickled is replaced by its text.
+    Errors can be pickled with message and attributes. An attribute that cannot be pickled is
+    replaced by its text.
     """
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Rebuild from message and attributes, because `args` lacks the arguments of a subclass's __init__."""
+        """Rebuild from message and attributes, because `args` lacks the arguments of a subclass's
+        __init__."""
         attributes = {name: _portable(value) for name, value in vars(self).items()}
         return copyreg.__newobj__, (type(self), *self.args), attributes  # type: ignore[attr-defined]
 
@@ -70,8 +75,8 @@ class RangeError(IapbError, OverflowError):
 class Mistake:
     """One mistake of a scene file: its place, the value found and the value expected.
 
-    Lines and columns count from 1; they are 0 if the value was not read from the file. `path` is the field's path,
-    such as ``bodies[0].mass``.
+    Lines and columns count from 1; they are 0 if the value was not read from the file. `path` is
+    the field's path, such as ``bodies[0].mass``.
     """
 
     file: str
@@ -87,7 +92,8 @@ class Mistake:
 
 
 class SceneError(IapbError, ValueError):
-    """A scene file (or study file) is invalid. The error lists *all* mistakes; `what` names the kind of file."""
+    """A scene file (or study file) is invalid. The error lists *all* mistakes; `what` names the
+    kind of file."""
 
     def __init__(self, mistakes: list[Mistake], what: str = "scene") -> None:
         self.mistakes = tuple(mistakes)
@@ -103,7 +109,9 @@ class MissingDependencyError(IapbError, ImportError):
 
     def __init__(self, package: str, purpose: str, install: str) -> None:
         self.package = package
-        super().__init__(f"{purpose} needs {package}, which is not installed. Install it with: {install}")
+        super().__init__(
+            f"{purpose} needs {package}, which is not installed. Install it with: {install}"
+        )
 
 
 def installing(extra: str) -> str:
@@ -113,15 +121,33 @@ def installing(extra: str) -> str:
 
 #: The extra that installs a package which the engine itself does not need.
 EXTRAS = {
-    **dict.fromkeys(("scipy", "h5py", "threadpoolctl", "pinocchio", "cvxpy", "clarabel", "qpsolvers", "daqp",
-                     "quadprog", "proxsuite", "quantecon", "mujoco"), "reference"),
-    **dict.fromkeys(("hypothesis", "sympy", "flint", "typer", "rich", "xarray", "h5netcdf"), "verify"),
+    **dict.fromkeys(
+        (
+            "scipy",
+            "h5py",
+            "threadpoolctl",
+            "pinocchio",
+            "cvxpy",
+            "clarabel",
+            "qpsolvers",
+            "daqp",
+            "quadprog",
+            "proxsuite",
+            "quantecon",
+            "mujoco",
+        ),
+        "reference",
+    ),
+    **dict.fromkeys(
+        ("hypothesis", "sympy", "flint", "typer", "rich", "xarray", "h5netcdf"), "verify"
+    ),
     **dict.fromkeys(("matplotlib", "jinja2", "latex2mathml", "viser"), "report"),
-}  # fmt: skip
+}
 
 
 def name_the_extra(error: ModuleNotFoundError, purpose: str) -> ImportError:
-    """Return a `MissingDependencyError` that names the extra of the missing package, or the error itself."""
+    """Return a `MissingDependencyError` that names the extra of the missing package, or the error
+    itself."""
     package = (error.name or "").partition(".")[0]
     if package not in EXTRAS:
         return error

@@ -16,7 +16,8 @@ from iapb.errors import IapbError, MissingDependencyError, installing, name_the_
 def lazy_names(
     package: str, homes: Mapping[str, str]
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
-    """Return ``__getattr__``, ``__dir__`` and ``__all__`` of a package whose names live in other modules.
+    """Return ``__getattr__``, ``__dir__`` and ``__all__`` of a package whose names live in other
+    modules.
 
     Parameters
     ----------
@@ -42,7 +43,8 @@ def lazy_names(
 
 
 def needed(module: str, purpose: str) -> Any:
-    """Import and return an optional module; if it is missing, raise an error that says how to install it.
+    """Import and return an optional module; if it is missing, raise an error that says how to
+    install it.
 
     If a package of the user hides one of this project, the error names both and says how to fix it.
     """
@@ -58,27 +60,33 @@ def needed(module: str, purpose: str) -> Any:
 
 
 def hidden_package() -> str:
-    """Say which package of this project another one of the same name hides; empty if none is hidden."""
+    """Say which package of this project another one of the same name hides; empty if none is
+    hidden."""
     ours = Path(__file__).resolve().parents[1]
     for name in ("reference", "verification", "reports"):
         spec = find_spec(name)
         places = [*(spec.submodule_search_locations or ()), spec.origin] if spec else []
         found = [Path(place).resolve() for place in places if place]
         if found and not any(place.is_relative_to(ours / name) for place in found):
-            return (f"{found[0]} hides the package {ours / name}, which has the same name. Rename yours, or take its "
-                    "folder off Python's import path.")  # fmt: skip
+            return (
+                f"{found[0]} hides the package {ours / name}, which has the same name. Rename "
+                f"yours, or take its "
+                "folder off Python's import path."
+            )
     return ""
 
 
 def extension(group: str, name: str) -> Any:
-    """Load the object that an installed package offers as an entry point; upper packages extend lower ones this way."""
+    """Load the object that an installed package offers as an entry point; upper packages extend
+    lower ones this way."""
     for found in load_extensions(group, name):
         return found
     raise MissingDependencyError("the extra report", f"{group}: {name}", installing("report"))
 
 
 def load_extensions(group: str, name: str = "") -> list[Any]:
-    """Import everything that installed packages offer in a group, or what they offer under a name."""
+    """Import everything that installed packages offer in a group, or what they offer under a
+    name."""
     try:
         offered = entry_points(group=group, name=name) if name else entry_points(group=group)
         return [each.load() for each in offered]

@@ -1,7 +1,8 @@
-"""Linear algebra without BLAS and LAPACK, because the last bits of their results depend on the processor.
+"""Linear algebra without BLAS and LAPACK, because the last bits of their results depend on the
+processor.
 
-3-vectors are tuples of three floats: LLVM keeps them in registers, and a formula stays one line. Kernels carry no type
-hints; numba infers them.
+3-vectors are tuples of three floats: LLVM keeps them in registers, and a formula stays one line.
+Kernels carry no type hints; numba infers them.
 """
 
 from __future__ import annotations
@@ -83,7 +84,11 @@ def transform(frames, i, a):
 @kernel
 def transform_back(frames, i, a):
     """frames[i]^T a."""
-    return (dot(column(frames, i, 0), a), dot(column(frames, i, 1), a), dot(column(frames, i, 2), a))
+    return (
+        dot(column(frames, i, 0), a),
+        dot(column(frames, i, 1), a),
+        dot(column(frames, i, 2), a),
+    )
 
 
 @kernel
@@ -98,7 +103,9 @@ def store_columns(frames, i, x, y, z):
 @kernel
 def turn_frame(frames, i, x, y, z):
     """frames[i] <- frames[i] [x y z], where x, y, z are the columns of a rotation."""
-    store_columns(frames, i, transform(frames, i, x), transform(frames, i, y), transform(frames, i, z))
+    store_columns(
+        frames, i, transform(frames, i, x), transform(frames, i, y), transform(frames, i, z)
+    )
 
 
 # Vectors of any length
@@ -131,7 +138,8 @@ def add_multiple(vector, factor, row):
 
 @kernel
 def orthogonalize(row, basis, count, overlaps):
-    """Remove the first `count` rows of an orthonormal basis from `row`; write the overlaps; return |row|² that is left.
+    """Remove the first `count` rows of an orthonormal basis from `row`; write the overlaps; return
+    |row|² that is left.
 
     Gram-Schmidt, twice: enough to be orthogonal to rounding (Kahan, in Parlett 1980).
     """
@@ -171,7 +179,8 @@ def cholesky(mass_matrix, lower):
 
 @kernel
 def cholesky_tree_blocks(matrix, start, stop, lower):
-    """Do `cholesky` for each block of a block diagonal M; other entries of `lower` stay; return 0, or 1 on failure."""
+    """Do `cholesky` for each block of a block diagonal M; other entries of `lower` stay; return 0,
+    or 1 on failure."""
     for t in range(start.shape[0]):
         i, j = start[t], stop[t]
         if cholesky(matrix[i:j, i:j], lower[i:j, i:j]) != 0:
@@ -210,10 +219,11 @@ def to_momentum(lower, u, momentum):
 
 @kernel
 def whiten_columns(lower, columns, count):
-    """Solve L X = columns in place for the first `count` columns: rows of J become columns of Aᵀ = L⁻¹ Jᵀ.
+    """Solve L X = columns in place for the first `count` columns: rows of J become columns of Aᵀ =
+    L⁻¹ Jᵀ.
 
-    One contact is one column, so the inner loops run over contacts: they are contiguous and vectorize without
-    reordering any sum.
+    One contact is one column, so the inner loops run over contacts: they are contiguous and
+    vectorize without reordering any sum.
     """
     d = lower.shape[0]
     for k in range(d):
@@ -229,11 +239,13 @@ def whiten_columns(lower, columns, count):
 
 @kernel
 def solve_mass(lower, force, acceleration):
-    """Solve M a = f by forward and back substitution; `force` may be the same array as `acceleration`.
+    """Solve M a = f by forward and back substitution; `force` may be the same array as
+    `acceleration`.
 
-    Three measures shorten the chain of dependent operations. Zeros of L are skipped, since a product with zero
-    would still wait for the coordinate before. Factors 1 / L_kk replace divisions, since they do not depend on the sum.
-    In the back substitution the entry that was computed last comes last in the sum.
+    Three measures shorten the chain of dependent operations. Zeros of L are skipped, since a
+    product with zero would still wait for the coordinate before. Factors 1 / L_kk replace
+    divisions, since they do not depend on the sum. In the back substitution the entry that was
+    computed last comes last in the sum.
     """
     d = force.shape[0]
     for k in range(d):
@@ -254,7 +266,8 @@ def solve_mass(lower, force, acceleration):
 
 @kernel
 def solve_tree_blocks(lower, start, stop, force, acceleration):
-    """Do `solve_mass` for a block diagonal M, tree by tree: linear in the number of trees, with the same bits."""
+    """Do `solve_mass` for a block diagonal M, tree by tree: linear in the number of trees, with the
+    same bits."""
     for t in range(start.shape[0]):
         i, j = start[t], stop[t]
         solve_mass(lower[i:j, i:j], force[i:j], acceleration[i:j])

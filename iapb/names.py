@@ -15,7 +15,8 @@ def nearest(wrong: Any, known: Iterable[Any]) -> str:
 
 
 def one_of(wrong: Any, known: Iterable[Any], lead: str = "one of ") -> str:
-    """Say what was expected instead of `wrong`: ``one of peg_corner, two_discs; did you mean peg_corner?``."""
+    """Say what was expected instead of `wrong`: ``one of peg_corner, two_discs; did you mean
+    peg_corner?``."""
     names = [str(name) for name in known]
     near = nearest(wrong, names)
     return lead + ", ".join(names) + (f"; did you mean {near}?" if near else "")

@@ -22,20 +22,33 @@ from iapb.scene.model import SpatialScene
 from iapb.schema import Floats, Quantity, blank, quantities
 from iapb.thinning import Thinned
 
-_CONTACT_ROWS_PER_CHUNK = 200_000  # bounds the memory of a chunk in scenes with many contacts (about 30 MB)
+_CONTACT_ROWS_PER_CHUNK = (
+    200_000  # bounds the memory of a chunk in scenes with many contacts (about 30 MB)
+)
 _ROOM = 30e6  # bytes of a record, unless one chunk is larger
 _PIECE = 16e6  # bytes of the steps that are held before they are thinned
 _BATCH = 50_000_000  # bytes of mass matrices held at once
-_STEPS_PER_CHUNK = PLANNED  # one second of the paper's loop: progress and Ctrl-C work at least that often
+_STEPS_PER_CHUNK = (
+    PLANNED  # one second of the paper's loop: progress and Ctrl-C work at least that often
+)
 
 # Arrays that the loop writes; poses, energies and digests of M are computed from them.
 STATES = tuple(each for each in quantities(Run, "time") if each.name != "pose")
-STEPS = (*quantities(Run, "step"), Quantity("contact_count", ("step",), np.int64, "1", "contacts of the step"))
+STEPS = (
+    *quantities(Run, "step"),
+    Quantity("contact_count", ("step",), np.int64, "1", "contacts of the step"),
+)
 CONTACTS = quantities(ContactTable, "contact")
 IMPACTS = tuple(each for each in quantities(ImpactTable) if each.name != "mass_digest")
 LINES = {"steps": STATES + STEPS, "contacts": CONTACTS, "impacts": IMPACTS}
-_KEPT_WHEN_CARRIED = ("kinetic", "potential", "impact_loss", "device_kinetic", "device_hand_work",
-                      "device_actuator_work")
+_KEPT_WHEN_CARRIED = (
+    "kinetic",
+    "potential",
+    "impact_loss",
+    "device_kinetic",
+    "device_hand_work",
+    "device_actuator_work",
+)
 
 Coordinates = tuple[int, int, int, int]
 
@@ -56,10 +69,22 @@ def chunk_steps(contacts: int, remaining: int) -> int:
 
 def make_record(steps: int, coordinates: Coordinates, contacts: int, trees: int) -> Any:
     """Allocate a record; `coordinates` = (nq, d, nq_t, d_t)."""
-    lengths = {"time": steps, "step": steps, "contact": steps * contacts, "impact": steps * trees, "axis": 3}
-    lengths |= zip(("coordinate", "velocity", "device_coordinate", "device_velocity"), coordinates, strict=True)
-    return block(Record(np.zeros(3, np.int64), **{
-        name: blank(listed, lengths, np.empty) for name, listed in LINES.items()}))
+    lengths = {
+        "time": steps,
+        "step": steps,
+        "contact": steps * contacts,
+        "impact": steps * trees,
+        "axis": 3,
+    }
+    lengths |= zip(
+        ("coordinate", "velocity", "device_coordinate", "device_velocity"), coordinates, strict=True
+    )
+    return block(
+        Record(
+            np.zeros(3, np.int64),
+            **{name: blank(listed, lengths, np.empty) for name, listed in LINES.items()},
+        )
+    )
 
 
 @kernel
@@ -68,7 +93,9 @@ def write_step(record, k, step, state, port):
     line = record.steps
     for i in range(state.q.shape[0]):
         line.q[k, i] = state.q[i]
-    for i in range(state.v.shape[0]):  # one loop: eight short ones would cost more than what they copy
+    for i in range(
+        state.v.shape[0]
+    ):  # one loop: eight short ones would cost more than what they copy
         line.v[k, i] = state.v[i]
         line.hand_force[k, i] = port.hand_force[i]
         line.coupling_force[k, i] = port.coupling_force[i]
@@ -115,19 +142,25 @@ def _write_tables(record, step, state):
 
 
 class Recorder:
-    """Collect the chunks of a running simulation and join them into a Run with poses, energies and effects.
+    """Collect the chunks of a running simulation and join them into a Run with poses, energies and
+    effects.
 
     Parameters
     ----------
     simulation : in its initial state
-    every : N, to keep every N-th step of a long run (see `iapb.thinning`); its steps are thinned piece by piece
+    every : N, to keep every N-th step of a long run (see `iapb.thinning`); its steps are thinned
+        piece by piece
     """
 
     def __init__(self, simulation: Any, every: int = 1) -> None:
         self.simulation = simulation
         port, state, system = simulation.port, simulation.state, simulation.system
-        self.start = {"q": state.q.copy(), "v": state.v.copy(),
-                      "device_q": port.device_q.copy(), "device_v": port.device_v.copy()}
+        self.start = {
+            "q": state.q.copy(),
+            "v": state.v.copy(),
+            "device_q": port.device_q.copy(),
+            "device_v": port.device_v.copy(),
+        }
         self.coordinates = len(state.q), len(state.v), len(port.device_q), len(port.device_v)
         self.shape = self.coordinates, system.capacity, len(system.mechanism.tree_dofs)
         self._line_bytes = sum(array.nbytes for array in make_record(1, *self.shape).arrays()[1:])
@@ -137,20 +170,26 @@ class Recorder:
         self.steps = 0  # number of all steps done
         self._thinned = Thinned(every) if every > 1 else None
         self._before: dict[str, float] = {}  # the energies at `first`
-        self._at_first: tuple[dict[str, Floats], dict[str, float]] | None = None  # state and energy of the whole run
+        self._at_first: tuple[dict[str, Floats], dict[str, float]] | None = (
+            None  # state and energy of the whole run
+        )
 
     @property
     def bytes_per_step(self) -> int:
-        """Bytes that a kept step without contacts adds to a run: lines (twice, for joining) and energies."""
+        """Bytes that a kept step without contacts adds to a run: lines (twice, for joining) and
+        energies."""
         lines = make_record(1, self.coordinates, 0, 0).arrays()[1:]
         return 2 * sum(array.nbytes for array in lines) + 8 * len(FORCES) + 40
 
     def chunk(self, total: int, most: int | None = None) -> BaseException | None:
-        """Simulate and record the next chunk, of at most `most` steps; return the exception that stopped it early."""
+        """Simulate and record the next chunk, of at most `most` steps; return the exception that
+        stopped it early."""
         if self._thinned and (self.steps - self.first) * self._line_bytes > _PIECE:
             self._thin(self._thinned, "", "", last=False)
         left = total - self.steps
-        size = chunk_steps(self.simulation.system.capacity, left if most is None else min(left, most))
+        size = chunk_steps(
+            self.simulation.system.capacity, left if most is None else min(left, most)
+        )
         if not self.records or len(self.records[-1].steps.q) < self.records[-1].used[0] + size:
             room = int(_ROOM / max(1, self._line_bytes))
             self.records.append(make_record(max(size, min(total - self.steps, room)), *self.shape))
@@ -163,7 +202,8 @@ class Recorder:
         return stop
 
     def run(self, world: str, stopped: str) -> Run:
-        """Return the recorded steps as a Run; `stopped` says why it is incomplete, empty if it is complete."""
+        """Return the recorded steps as a Run; `stopped` says why it is incomplete, empty if it is
+        complete."""
         if self._thinned:
             return self._thinned.run(self._thin(self._thinned, world, stopped, last=True))
         return self._held(world, stopped)
@@ -183,43 +223,74 @@ class Recorder:
         return piece
 
     def joined(self, lines: str) -> dict[str, Any]:
-        """Return copies of the columns of `steps`, `contacts` or `impacts` over all records; states from the start."""
+        """Return copies of the columns of `steps`, `contacts` or `impacts` over all records; states
+        from the start."""
         number = list(LINES).index(lines)
         first = self.start if lines == "steps" else {}
-        return {each.name: np.concatenate([
-            *([first[each.name][None]] if each.name in first else []),
-            *(getattr(getattr(record, lines), each.name)[: record.used[number]] for record in self.records)])
-            for each in LINES[lines]}
+        return {
+            each.name: np.concatenate(
+                [
+                    *([first[each.name][None]] if each.name in first else []),
+                    *(
+                        getattr(getattr(record, lines), each.name)[: record.used[number]]
+                        for record in self.records
+                    ),
+                ]
+            )
+            for each in LINES[lines]
+        }
 
     def _held(self, world: str, stopped: str) -> Run:
         """Return the steps held as a Run."""
         simulation, system = self.simulation, self.simulation.system
-        law, coupling, scene, mechanism = simulation.law, simulation.coupling, simulation.scene, system.mechanism
+        law, coupling, scene, mechanism = (
+            simulation.law,
+            simulation.coupling,
+            simulation.scene,
+            system.mechanism,
+        )
         steps, impacts = self.joined("steps"), self.joined("impacts")
         offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(steps.pop("contact_count"))])
         struck = steps["q"][impacts["step"] - self.first]
         ledger, planar = self._ledger, not isinstance(scene, SpatialScene)
         later: dict[str, Any] = {
-            "scene_source": Later(lambda run: scene.source_text), "scene_resolved": Later(lambda run: scene.resolved()),
+            "scene_source": Later(lambda run: scene.source_text),
+            "scene_resolved": Later(lambda run: scene.resolved()),
             "pose": Later(lambda run: mechanism.poses(run.q, planar=planar)),
             "energy": Later(lambda run: _shown(ledger(run), run)),
             "distrust": Later(partial(_distrust, self._at_first)),
         }
         remarks = system.remarks + (UNSOLVED,) * bool(simulation.state.rest_work.shortened[0])
         return Run(
-            scene_name=scene.name, world=world or f"{law.name} + {coupling.name}",
-            law=law.name, law_settings=dict(law.settings), coupling=coupling.name,
-            coupling_settings=dict(coupling.settings), dt=system.dt, complete=not stopped,
-            coordinate_names=mechanism.coordinate_names, coordinate_units=mechanism.coordinate_units,
-            velocity_names=mechanism.velocity_names, velocity_units=mechanism.velocity_units,
-            body_names=mechanism.names, tool_dofs=system.tool_dofs, tool_coordinates=system.tool_coordinates,
-            time=np.arange(self.first, self.steps + 1, dtype=np.float64) * system.dt, **steps,
+            scene_name=scene.name,
+            world=world or f"{law.name} + {coupling.name}",
+            law=law.name,
+            law_settings=dict(law.settings),
+            coupling=coupling.name,
+            coupling_settings=dict(coupling.settings),
+            dt=system.dt,
+            complete=not stopped,
+            coordinate_names=mechanism.coordinate_names,
+            coordinate_units=mechanism.coordinate_units,
+            velocity_names=mechanism.velocity_names,
+            velocity_units=mechanism.velocity_units,
+            body_names=mechanism.names,
+            tool_dofs=system.tool_dofs,
+            tool_coordinates=system.tool_coordinates,
+            time=np.arange(self.first, self.steps + 1, dtype=np.float64) * system.dt,
+            **steps,
             contacts=ContactTable(offsets, **self.joined("contacts")),
             impacts=ImpactTable(**impacts, mass_digest=_mass_digests(mechanism, struck)),
-            effects=tuple(EffectRow(one.name, one.active, one.reason, one.ignores) for one in simulation.effects),
+            effects=tuple(
+                EffectRow(one.name, one.active, one.reason, one.ignores)
+                for one in simulation.effects
+            ),
             chunk_steps=np.array([steps for steps, _ in self.timings], np.int64),
             chunk_seconds=np.array([seconds for _, seconds in self.timings], np.float64),
-            kernel="compiled" if simulation.compiled else "python", stopped=stopped, remarks=remarks, **later,
+            kernel="compiled" if simulation.compiled else "python",
+            stopped=stopped,
+            remarks=remarks,
+            **later,
         )
 
     @property
@@ -227,28 +298,52 @@ class Recorder:
         """The function that computes all energies of a run made now."""
         system = self.simulation.system
         device = system.device_mechanism() if self.simulation.coupling.name != "none" else None
-        return partial(energy_of_run, mechanism=system.mechanism, gravity=system.gravity, device=device,
-                       before=self._before)
+        return partial(
+            energy_of_run,
+            mechanism=system.mechanism,
+            gravity=system.gravity,
+            device=device,
+            before=self._before,
+        )
 
 
 def _mass_digests(mechanism: Mechanism, places: Floats) -> NDArray[np.int64]:
-    """Return the digest of M at each of n configurations (n, nq), a few at a time: all of them may take gigabytes."""
+    """Return the digest of M at each of n configurations (n, nq), a few at a time: all of them may
+    take gigabytes."""
     few = max(1, _BATCH // max(1, 8 * mechanism.nv**2))
-    return np.concatenate([np.zeros(0, np.int64), *(digests(mechanism.mass_matrices(places[k : k + few]))
-                                                    for k in range(0, len(places), few))])
+    return np.concatenate(
+        [
+            np.zeros(0, np.int64),
+            *(
+                digests(mechanism.mass_matrices(places[k : k + few]))
+                for k in range(0, len(places), few)
+            ),
+        ]
+    )
 
 
 def _shown(ledger: dict[str, Floats], run: Run) -> dict[str, Floats]:
-    """Return the energies to record. A unilateral coupler carries the tool at times: then leave its balance out."""
+    """Return the energies to record. A unilateral coupler carries the tool at times: then leave its
+    balance out."""
     carried = run.coupling == "unilateral"
-    return {name: values for name, values in ledger.items() if name in _KEPT_WHEN_CARRIED or not carried}
+    return {
+        name: values for name, values in ledger.items() if name in _KEPT_WHEN_CARRIED or not carried
+    }
 
 
-def _distrust(at_first: tuple[dict[str, Floats], dict[str, float]] | None, part: Run) -> tuple[str, ...]:
-    """Return the distrust of a run; of a later part, as if its first state were that of the whole run."""
+def _distrust(
+    at_first: tuple[dict[str, Floats], dict[str, float]] | None, part: Run
+) -> tuple[str, ...]:
+    """Return the distrust of a run; of a later part, as if its first state were that of the whole
+    run."""
     if at_first is None:
         return distrust_of(part)
     states: dict[str, Any] = {
-        name: np.concatenate([state[None], getattr(part, name)[1:]]) for name, state in at_first[0].items()}
-    ledger = {name: np.concatenate([[value], part.energy[name][1:]]) for name, value in at_first[1].items()}
+        name: np.concatenate([state[None], getattr(part, name)[1:]])
+        for name, state in at_first[0].items()
+    }
+    ledger = {
+        name: np.concatenate([[value], part.energy[name][1:]])
+        for name, value in at_first[1].items()
+    }
     return distrust_of(replace(part, energy=part.energy | ledger, distrust=(), **states))

@@ -1,10 +1,11 @@
 """Run: the record of one simulation, and the definition of every recorded array.
 
-All evaluation after the simulation uses a Run alone. Each recorded array has its dimensions, unit and meaning in its
-field definition below. The loop's record (`iapb.recording`), the run file (`reports.store.schema`) and the test of
-docs/notation.md use these definitions. States are sampled at n + 1 instants (dimension time); step quantities belong
-to the n steps between them. The dimension velocity has the d generalized velocities, and device_velocity has those of
-the tool in the hand (and of the device, which has the same kinematics).
+All evaluation after the simulation uses a Run alone. Each recorded array has its dimensions, unit
+and meaning in its field definition below. The loop's record (`iapb.recording`), the run file
+(`reports.store.schema`) and the test of docs/notation.md use these definitions. States are sampled
+at n + 1 instants (dimension time); step quantities belong to the n steps between them. The
+dimension velocity has the d generalized velocities, and device_velocity has those of the tool in
+the hand (and of the device, which has the same kinematics).
 """
 
 from __future__ import annotations
@@ -23,7 +24,9 @@ from iapb.lazy import extension, needed
 from iapb.schema import Booleans, Floats, Integers, Quantity, States, quantities, quantity
 
 FREE, COLLIDING, RESTING = 0, 1, 2  # contact states of the paper, section III
-UNSOLVED = "resting contact was not solved to rounding, and velocities were shortened"  # begins a remark
+UNSOLVED = (
+    "resting contact was not solved to rounding, and velocities were shortened"  # begins a remark
+)
 STATE_NAMES = ("free", "colliding", "resting")
 _SHOWN = 12  # most coordinates that a plot or a table shows
 
@@ -39,25 +42,35 @@ IMPULSE = {"m/s": "N s", "rad/s": "N m s", "1": "1"}
 class ContactTable:
     """Contacts of all steps. The rows ``offsets[k]:offsets[k + 1]`` are the contacts of step k."""
 
-    offsets: Annotated[Integers, quantity("step_edge", "1", "first row of each step's contacts; the last entry closes")]
+    offsets: Annotated[
+        Integers,
+        quantity("step_edge", "1", "first row of each step's contacts; the last entry closes"),
+    ]
     body_a: Annotated[Integers, quantity("contact", "1", "moving body that the normal points into")]
     body_b: Annotated[Integers, quantity("contact", "1", "other body, -1 = the static world")]
     point: Annotated[Floats, quantity("contact axis", "m", "contact point, world axes")]
     normal: Annotated[Floats, quantity("contact axis", "1", "unit normal, from b into a")]
     gap: Annotated[Floats, quantity("contact", "m", "distance, negative = overlap")]
-    normal_velocity: Annotated[Floats, quantity("contact", "m/s", "before the step's impulse, positive separates")]
+    normal_velocity: Annotated[
+        Floats, quantity("contact", "m/s", "before the step's impulse, positive separates")
+    ]
     normal_force: Annotated[Floats, quantity("contact", "N", "force on a along the normal")]
     friction_force: Annotated[Floats, quantity("contact axis", "N", "friction force on a")]
     # the one of least norm if it is not unique
-    impulse: Annotated[Floats, quantity("contact", "N s", "collision impulse on a along the normal")]
-    is_new: Annotated[Booleans, quantity("contact", "1", "1 where the contact was not there in the step before")]
+    impulse: Annotated[
+        Floats, quantity("contact", "N s", "collision impulse on a along the normal")
+    ]
+    is_new: Annotated[
+        Booleans, quantity("contact", "1", "1 where the contact was not there in the step before")
+    ]
 
 
 @dataclass(frozen=True)
 class ImpactTable:
     """Resolved impacts: one row per step and island of a colliding group (paper section V).
 
-    An island is a set of trees connected by contacts of the impact. A tree that merely touches them is not in it.
+    An island is a set of trees connected by contacts of the impact. A tree that merely touches them
+    is not in it.
     """
 
     step: Annotated[Integers, quantity("impact", "1", "step in which it happened")]
@@ -68,27 +81,49 @@ class ImpactTable:
     rows: Annotated[Integers, quantity("impact", "1", "rows given to the resolver")]
     rank: Annotated[Integers, quantity("impact", "1", "rows it found independent and used")]
     energy_lost: Annotated[Floats, quantity("impact", "J", "kinetic energy before minus after")]
-    scale: Annotated[Floats, quantity("impact", "1", "factor by which the device limit scaled the impulse")]
+    scale: Annotated[
+        Floats, quantity("impact", "1", "factor by which the device limit scaled the impulse")
+    ]
     clamp: Annotated[Floats, quantity("impact", "1", "factor of the final energy clamp")]
-    friction_share: Annotated[Floats, quantity("impact", "1", "factor by which friction was reduced (energy, cones)")]
-    approaching: Annotated[Integers, quantity(
-        "impact", "1", "rows that approach still afterwards, -1 = the law does not say")]
-    solved: Annotated[Booleans, quantity(
-        "impact", "1", "0 where the law is not met (friction reduced); passive all the same")]
-    mass_digest: Annotated[Integers, quantity(
-        "impact", "1", "first 8 bytes of BLAKE2b of M made again from the recorded q, as a signed integer")]
+    friction_share: Annotated[
+        Floats, quantity("impact", "1", "factor by which friction was reduced (energy, cones)")
+    ]
+    approaching: Annotated[
+        Integers,
+        quantity("impact", "1", "rows that approach still afterwards, -1 = the law does not say"),
+    ]
+    solved: Annotated[
+        Booleans,
+        quantity(
+            "impact", "1", "0 where the law is not met (friction reduced); passive all the same"
+        ),
+    ]
+    mass_digest: Annotated[
+        Integers,
+        quantity(
+            "impact",
+            "1",
+            "first 8 bytes of BLAKE2b of M made again from the recorded q, as a signed integer",
+        ),
+    ]
 
 
 def digests(matrices: Floats) -> Integers:
     """Return the `mass_digest` of each of n matrices (n, d, d)."""
     plain = np.ascontiguousarray(matrices, "<f8")
-    return np.array([int.from_bytes(blake2b(one.tobytes(), digest_size=8).digest(), "little", signed=True)
-                     for one in plain], np.int64)
+    return np.array(
+        [
+            int.from_bytes(blake2b(one.tobytes(), digest_size=8).digest(), "little", signed=True)
+            for one in plain
+        ],
+        np.int64,
+    )
 
 
 @dataclass(frozen=True)
 class EffectRow:
-    """One line of the effects table: whether the effect was on, and why. `ignores`: field that the law ignored."""
+    """One line of the effects table: whether the effect was on, and why. `ignores`: field that the
+    law ignored."""
 
     name: str
     active: bool
@@ -106,7 +141,8 @@ class Later(NamedTuple):
 class Run:
     """One simulation: scene, law, coupling and all recorded quantities (SI units).
 
-    Derived quantities (`pose`, `energy`, `distrust`, the text of scene and effects) are computed at first use.
+    Derived quantities (`pose`, `energy`, `distrust`, the text of scene and effects) are computed at
+    first use.
     """
 
     scene_name: str
@@ -122,26 +158,47 @@ class Run:
     coordinate_names: tuple[str, ...]  # (nq,)
     coordinate_units: tuple[str, ...]  # (nq,)
     velocity_names: tuple[str, ...]  # (d,), also for generalized forces and impulses
-    velocity_units: tuple[str, ...]  # (d,) m/s or rad/s; forces have N or N m, impulses N s or N m s
+    velocity_units: tuple[
+        str, ...
+    ]  # (d,) m/s or rad/s; forces have N or N m, impulses N s or N m s
     body_names: tuple[str, ...]
     tool_dofs: tuple[int, int]  # start, stop of the tool in v; (0, 0) without a hand
-    tool_coordinates: tuple[int, int]  # start, stop of the tool in q: a quaternion has more entries than its velocity
+    tool_coordinates: tuple[
+        int, int
+    ]  # start, stop of the tool in q: a quaternion has more entries than its velocity
 
     time: Floats  # (n + 1,) [s]
     q: Annotated[Floats, quantity("time coordinate", POSITION, "generalized configuration")]
     v: Annotated[Floats, quantity("time velocity", VELOCITY, "generalized velocity")]
-    device_q: Annotated[Floats, quantity("time device_coordinate", POSITION, "configuration of the device")]
-    device_v: Annotated[Floats, quantity("time device_velocity", VELOCITY, "velocity of the device")]
-    # of each body's frame: x, y, angle in (−π, π] in the plane; x, y, z and a quaternion x, y, z, w >= 0 in space
+    device_q: Annotated[
+        Floats, quantity("time device_coordinate", POSITION, "configuration of the device")
+    ]
+    device_v: Annotated[
+        Floats, quantity("time device_velocity", VELOCITY, "velocity of the device")
+    ]
+    # of each body's frame: x, y, angle in (−π, π] in the plane; x, y, z and a quaternion x, y, z, w
+    # >= 0 in space
     pose: Annotated[Floats, quantity("time body placement", POSITION, "where each body is")]
 
-    hand_force: Annotated[Floats, quantity("step velocity", FORCE, "generalized force of the hand on the tool")]
-    coupling_force: Annotated[Floats, quantity("step velocity", FORCE, "force of the coupling on the tool")]
-    penalty_force: Annotated[Floats, quantity("step velocity", FORCE, "normal contact forces, or constraint forces")]
+    hand_force: Annotated[
+        Floats, quantity("step velocity", FORCE, "generalized force of the hand on the tool")
+    ]
+    coupling_force: Annotated[
+        Floats, quantity("step velocity", FORCE, "force of the coupling on the tool")
+    ]
+    penalty_force: Annotated[
+        Floats, quantity("step velocity", FORCE, "normal contact forces, or constraint forces")
+    ]
     friction_force: Annotated[Floats, quantity("step velocity", FORCE, "friction forces")]
-    impulse: Annotated[Floats, quantity("step velocity", IMPULSE, "generalized collision impulse of the step")]
-    environment_force: Annotated[Floats, quantity("step velocity", FORCE, "contact forces + impulse / dt (26)")]
-    device_force: Annotated[Floats, quantity("step device_velocity", FORCE, "what the device's actuators apply")]
+    impulse: Annotated[
+        Floats, quantity("step velocity", IMPULSE, "generalized collision impulse of the step")
+    ]
+    environment_force: Annotated[
+        Floats, quantity("step velocity", FORCE, "contact forces + impulse / dt (26)")
+    ]
+    device_force: Annotated[
+        Floats, quantity("step device_velocity", FORCE, "what the device's actuators apply")
+    ]
     state: Annotated[States, quantity("step", "1", "contact state of the tool's group")]
     contacts: ContactTable
     impacts: ImpactTable
@@ -149,15 +206,20 @@ class Run:
     effects: tuple[EffectRow, ...]
 
     chunk_steps: Annotated[Integers, quantity("chunk", "1", "steps per timed chunk")] = field(
-        default_factory=lambda: np.zeros(0, np.int64))
+        default_factory=lambda: np.zeros(0, np.int64)
+    )
     chunk_seconds: Annotated[Floats, quantity("chunk", "s", "wall time of each chunk")] = field(
-        default_factory=lambda: np.zeros(0))
+        default_factory=lambda: np.zeros(0)
+    )
     kernel: str = "compiled"  # or "python"
     stopped: str = ""  # why an incomplete run was stopped; empty for a complete one
     remarks: tuple[str, ...] = ()  # remarks on values chosen for the scene
     # why the result is not to be trusted (`iapb.advice.distrust`); empty if nothing is wrong
-    distrust: tuple[str, ...] = field(default_factory=tuple)  # no default of the class, which would hide a Later
-    every: int = 1  # N: of a long run, every N-th step is recorded, and each step with an impact (`iapb.thinning`)
+    distrust: tuple[str, ...] = field(
+        default_factory=tuple
+    )  # no default of the class, which would hide a Later
+    # N: of a long run, every N-th step is recorded, and each step with an impact (`iapb.thinning`)
+    every: int = 1
 
     def __post_init__(self) -> None:
         """Set the attributes aside that are computed at first use."""
@@ -189,13 +251,17 @@ class Run:
 
     @property
     def records_contacts(self) -> bool:
-        """Whether contacts and forces are recorded; another engine gives states alone (`iapb.engines`)."""
+        """Whether contacts and forces are recorded; another engine gives states alone
+        (`iapb.engines`)."""
         return len(self.state) == self.steps
 
     def __repr__(self) -> str:
         """Return the summary, and the first reason for distrust if there is one."""
-        return f"<Run of {self.summary}>" if not self.distrust else (
-            f"<Run of {self.summary}\n not to be trusted, because {self.distrust[0]}>")
+        return (
+            f"<Run of {self.summary}>"
+            if not self.distrust
+            else (f"<Run of {self.summary}\n not to be trusted, because {self.distrust[0]}>")
+        )
 
     @property
     def summary(self) -> str:
@@ -206,41 +272,77 @@ class Run:
         if not self.records_contacts:
             return f"{done}, contacts not recorded"
         deepest = max(0.0, -float(self.contacts.gap.min(initial=0.0)))
-        return f"{done}, {len(self.impacts.step)} impacts, penetration at most {1e3 * deepest:.3g} mm"
+        return (
+            f"{done}, {len(self.impacts.step)} impacts, penetration at most {1e3 * deepest:.3g} mm"
+        )
 
     def _repr_html_(self) -> str:
         """The summary and the last state as a small table, for notebooks."""
-        rows = "".join(f"<tr><td>{escape(name)}</td><td>{value:.6g}</td><td>{unit}</td></tr>" for name, value, unit in
-                       list(zip(self.coordinate_names, self.q[-1], self.coordinate_units, strict=True))[:_SHOWN])
+        rows = "".join(
+            f"<tr><td>{escape(name)}</td><td>{value:.6g}</td><td>{unit}</td></tr>"
+            for name, value, unit in list(
+                zip(self.coordinate_names, self.q[-1], self.coordinate_units, strict=True)
+            )[:_SHOWN]
+        )
         more = len(self.coordinate_names) - _SHOWN
         rest = f"<p>and {more} more coordinates</p>" if more > 0 else ""
-        doubts = "".join(f"<p><b>Not to be trusted, because {escape(why)}.</b></p>" for why in self.distrust)
-        return (f"<p>{escape(self.summary)}</p>{doubts}<table><tr><th>at the end</th><th>value</th><th>unit</th></tr>"
-                f"{rows}</table>{rest}")
+        doubts = "".join(
+            f"<p><b>Not to be trusted, because {escape(why)}.</b></p>" for why in self.distrust
+        )
+        return (
+            f"<p>{escape(self.summary)}</p>{doubts}<table><tr><th>at the "
+            f"end</th><th>value</th><th>unit</th></tr>"
+            f"{rows}</table>{rest}"
+        )
 
     def to_xarray(self) -> Any:
         """Return everything recorded as one `xarray.Dataset`, with units and labelled dimensions.
 
-        Arrays of contacts and impacts have the prefixes ``contact_`` and ``impact_``; energies have ``energy_``.
+        Arrays of contacts and impacts have the prefixes ``contact_`` and ``impact_``; energies have
+        ``energy_``.
         """
         xarray = needed("xarray", "Run.to_xarray")
-        listed = [(record, prefix, each) for record, prefix in (
-            (self, ""), (self.contacts, "contact_"), (self.impacts, "impact_")) for each in quantities(type(record))
-            if each.dimensions[0] != "step" or self.records_contacts]
-        variables = {prefix + each.name: (each.dimensions, getattr(record, each.name),
-                                          {"units": unit_of(each, self), "long_name": each.meaning})
-                     for record, prefix, each in listed}
-        variables |= {f"energy_{name}": ((energy_dimension(self, name),), values, {"units": "J"})
-                      for name, values in self.energy.items()}
-        sizes = {name: length for dimensions, values, _ in variables.values()
-                 for name, length in zip(dimensions, values.shape, strict=True)}
-        labels = {name: list(coordinates_of(self, name, length)[0]) for name, length in sizes.items()}
-        heading = {name: getattr(self, name) for name in ("scene_name", "world", "law", "coupling", "dt")}
+        listed = [
+            (record, prefix, each)
+            for record, prefix in (
+                (self, ""),
+                (self.contacts, "contact_"),
+                (self.impacts, "impact_"),
+            )
+            for each in quantities(type(record))
+            if each.dimensions[0] != "step" or self.records_contacts
+        ]
+        variables = {
+            prefix + each.name: (
+                each.dimensions,
+                getattr(record, each.name),
+                {"units": unit_of(each, self), "long_name": each.meaning},
+            )
+            for record, prefix, each in listed
+        }
+        variables |= {
+            f"energy_{name}": ((energy_dimension(self, name),), values, {"units": "J"})
+            for name, values in self.energy.items()
+        }
+        sizes = {
+            name: length
+            for dimensions, values, _ in variables.values()
+            for name, length in zip(dimensions, values.shape, strict=True)
+        }
+        labels = {
+            name: list(coordinates_of(self, name, length)[0]) for name, length in sizes.items()
+        }
+        heading = {
+            name: getattr(self, name) for name in ("scene_name", "world", "law", "coupling", "dt")
+        }
         return xarray.Dataset(variables, labels, {**heading, "distrust": "; ".join(self.distrust)})
 
     def plot(self) -> Any:
-        """Draw coordinates, energy and the deepest contact over time; return the matplotlib figure."""
-        figure = needed("matplotlib.figure", "Run.plot").Figure(figsize=(8.0, 7.0), layout="constrained")
+        """Draw coordinates, energy and the deepest contact over time; return the matplotlib
+        figure."""
+        figure = needed("matplotlib.figure", "Run.plot").Figure(
+            figsize=(8.0, 7.0), layout="constrained"
+        )
         places, energy, *depth = figure.subplots(2 + self.records_contacts, 1, sharex=True)
         for i, name in enumerate(self.coordinate_names[:_SHOWN]):
             places.plot(self.time, self.q[:, i], label=f"{name} [{self.coordinate_units[i]}]")
@@ -248,19 +350,28 @@ class Run:
             if name in self.energy:
                 energy.plot(self.time, self.energy[name], label=name)
         deepest = np.zeros(self.steps)
-        np.maximum.at(deepest, np.repeat(np.arange(self.steps), np.diff(self.contacts.offsets)), -self.contacts.gap)
+        np.maximum.at(
+            deepest,
+            np.repeat(np.arange(self.steps), np.diff(self.contacts.offsets)),
+            -self.contacts.gap,
+        )
         for axes in depth:
             axes.plot(self.time[:-1], 1e3 * deepest, label="deepest contact")
         drawn = [places, energy, *depth]
-        for axes, label in zip(drawn, ("coordinates", "energy [J]", "penetration [mm]"), strict=False):
+        for axes, label in zip(
+            drawn, ("coordinates", "energy [J]", "penetration [mm]"), strict=False
+        ):
             axes.set_ylabel(label)
             axes.legend(loc="best", fontsize="small")
         drawn[-1].set_xlabel("time [s]")
-        figure.suptitle(f"{self.scene_name} in {self.world}" + (" (not to be trusted)" if self.distrust else ""))
+        figure.suptitle(
+            f"{self.scene_name} in {self.world}" + (" (not to be trusted)" if self.distrust else "")
+        )
         return figure
 
     def save(self, path: Any, *, replace: bool = False) -> Any:
-        """Write the run as one HDF5 file, as `iapb run` does; `reports.store.read_run` reads it back.
+        """Write the run as one HDF5 file, as `iapb run` does; `reports.store.read_run` reads it
+        back.
 
         Parameters
         ----------
@@ -281,7 +392,8 @@ class Run:
 
 
 def energy_dimension(run: Run, name: str) -> str:
-    """Return the dimension of an energy array: ``time`` if it has n + 1 values, ``step`` if it has n."""
+    """Return the dimension of an energy array: ``time`` if it has n + 1 values, ``step`` if it has
+    n."""
     length = len(run.energy[name])
     return {run.steps + 1: "time", run.steps: "step"}.get(length, f"{name}_entry")
 
@@ -294,7 +406,9 @@ def unit_of(quantity: Quantity, run: Run) -> str:
     return units[0] if len(set(units)) == 1 else ", ".join(units) or "1"
 
 
-def coordinates_of(run: Run, dimension: str, length: int) -> tuple[NDArray[Any] | tuple[str, ...], str]:
+def coordinates_of(
+    run: Run, dimension: str, length: int
+) -> tuple[NDArray[Any] | tuple[str, ...], str]:
     """Return the values along a dimension and their unit: labels, instants, or 0, 1, 2 …"""
     if dimension == "time":
         return np.asarray(run.time, np.float64), "s"
@@ -315,6 +429,8 @@ def _labels_along(run: Run, dimension: str) -> tuple[tuple[str, ...], tuple[str,
         "device_velocity": (run.velocity_names[v], run.velocity_units[v]),
         "body": (run.body_names, ()),
         "axis": (("x", "y", "z"), ()),
-        "placement": (("x", "y", "angle") if planar else ("x", "y", "z", "qx", "qy", "qz", "qw"),
-                      ("m", "m", "rad") if planar else ("m", "m", "m", "1", "1", "1", "1")),
+        "placement": (
+            ("x", "y", "angle") if planar else ("x", "y", "z", "qx", "qy", "qz", "qw"),
+            ("m", "m", "rad") if planar else ("m", "m", "m", "1", "1", "1", "1"),
+        ),
     }.get(dimension, ((), ()))

@@ -1,11 +1,13 @@
-"""The simulation loop: couple, advance the contact law, drive the device, record. It runs compiled or in Python.
+"""The simulation loop: couple, advance the contact law, drive the device, record. It runs compiled
+or in Python.
 
     every step of length Δt:
         hand and coupling pull the tool                 (VI)   couple
         contacts → collisions → resting forces → move   (III-V, IV)   the law
         F_env is rendered, the device moves             (V-C, VI)   render, move_device
 
-A real device gets its force after the law has advanced. Its position is read at the end of the step.
+A real device gets its force after the law has advanced. Its position is read at the end of the
+step.
 """
 
 from __future__ import annotations
@@ -42,16 +44,24 @@ from iapb.system import System, system_of
 from iapb.worlds import find_world
 
 DEVICE_NOT_FINITE = 1 + max(STATUS_TEXT)
-FAILURES = STATUS_TEXT | {DEVICE_NOT_FINITE: "the device's motion left the range of numbers: the step is too long "
-                                             "for this coupling and delay"}
+FAILURES = STATUS_TEXT | {
+    DEVICE_NOT_FINITE: "the device's motion left the range of numbers: the step is too long "
+    "for this coupling and delay"
+}
 
 
-PULL, MOVE, WRITE, WHOLE = 1, 2, 4, 7  # parts of a step; a single one costs no second compilation of the engine
+PULL, MOVE, WRITE, WHOLE = (
+    1,
+    2,
+    4,
+    7,
+)  # parts of a step; a single one costs no second compilation of the engine
 
 
 @kernel
 def compiled_steps(world, state, port, record, part, first, steps):  # type: ignore[no-untyped-def]
-    """Do `steps` steps of an engine law, or one part of a step; return the number of steps done and the status."""
+    """Do `steps` steps of an engine law, or one part of a step; return the number of steps done and
+    the status."""
     line = record.used[0]
     for k in range(steps):
         if part & PULL:
@@ -75,13 +85,16 @@ INTERRUPTED = "interrupted"  # value of `Run.stopped` after Ctrl-C
 
 
 class Simulation:
-    """A simulation of a scene under a contact law and a coupling, advanced by single steps or by chunks.
+    """A simulation of a scene under a contact law and a coupling, advanced by single steps or by
+    chunks.
 
     Parameters
     ----------
-    scene : Scene, its `iapb.system.System`, the path of a scene file, or the name of a scene of the project.
+    scene : Scene, its `iapb.system.System`, the path of a scene file, or the name of a scene of the
+        project.
     law : contact law; default `ImpulseAugmented()`.
-    coupling : coupling of device and tool; default `NoCoupling()`, with which the hand holds the tool itself.
+    coupling : coupling of device and tool; default `NoCoupling()`, with which the hand holds the
+        tool itself.
     device : a Python device model (`iapb.haptics.device.Device`); default: the compiled device.
 
     Examples
@@ -90,26 +103,45 @@ class Simulation:
     >>> result = simulation.step(hand_force=[0.1, 0.0, 0.0])
     """
 
-    def __init__(self, scene: Scene | System | str | Path, law: ContactLaw | None = None,
-                 coupling: Coupling | None = None, device: Device | None = None) -> None:
+    def __init__(
+        self,
+        scene: Scene | System | str | Path,
+        law: ContactLaw | None = None,
+        coupling: Coupling | None = None,
+        device: Device | None = None,
+    ) -> None:
         self.law: Any = ImpulseAugmented() if law is None else law
-        if isinstance(law, type) or not all(hasattr(self.law, name) for name in ("name", "settings", "advance")):
-            raise ArgumentError("law", law, "a contact law: an object with name, settings and advance(...); "
-                                            "the name of a world is given as world=...")  # fmt: skip
+        if isinstance(law, type) or not all(
+            hasattr(self.law, name) for name in ("name", "settings", "advance")
+        ):
+            raise ArgumentError(
+                "law",
+                law,
+                "a contact law: an object with name, settings and advance(...); "
+                "the name of a world is given as world=...",
+            )
         self.coupling: Coupling = NoCoupling() if coupling is None else coupling
         if not isinstance(self.coupling, Coupling):
-            raise ArgumentError("coupling", coupling, "a NoCoupling(), FourChannel(...) or UnilateralCoupler(...)")
+            raise ArgumentError(
+                "coupling", coupling, "a NoCoupling(), FourChannel(...) or UnilateralCoupler(...)"
+            )
         scene = scene if isinstance(scene, Scene | System) else load_scene(find_scene(scene))
         self.system = scene if isinstance(scene, System) else System(scene)
         self.scene = self.system.scene
         if isinstance(self.law, ImpulseAugmented | Penalty):
             self.law = self.law.within(self.scene)
         self.state = self.system.make_state()
-        self.compiled = getattr(type(self.law), "advance", None) is Penalty.advance  # else a subclass overrides it
+        self.compiled = (
+            getattr(type(self.law), "advance", None) is Penalty.advance
+        )  # else a subclass overrides it
         self.effects = self.system.decide(self.law, self.coupling)
-        self.world = self.system.world_under(*(self.law, self.effects) if self.compiled else (Penalty(),))
+        self.world = self.system.world_under(
+            *(self.law, self.effects) if self.compiled else (Penalty(),)
+        )
         self.port = self.system.make_port(self.coupling, self.effects, external=device is not None)
-        self.link = None if device is None else DeviceLink(device, self.world, self.state, self.port)
+        self.link = (
+            None if device is None else DeviceLink(device, self.world, self.state, self.port)
+        )
         self._couple, self._render, self._move = Entry(couple), Entry(render), Entry(move_device)
         self._write, self._steps = Entry(write_step), Entry(compiled_steps)
         self._planned = self.scene.hand is not None and self.scene.hand.changes
@@ -121,12 +153,14 @@ class Simulation:
         return self.steps_done * self.system.dt
 
     def step(self, hand_force: ArrayLike | None = None) -> StepResult:
-        """Do one step and return its result; the arrays are copies, with q and v at the end of the step.
+        """Do one step and return its result; the arrays are copies, with q and v at the end of the
+        step.
 
         Parameters
         ----------
-        hand_force : force [N] and torque [N m] of the hand from now on in world axes, (3,) in the plane or (6,) in
-            space. None keeps the last one; at first that is the scene's force, which may change over time.
+        hand_force : force [N] and torque [N m] of the hand from now on in world axes, (3,) in the
+            plane or (6,) in space. None keeps the last one; at first that is the scene's force,
+            which may change over time.
 
         Raises
         ------
@@ -150,14 +184,18 @@ class Simulation:
             self.link.exchange()
         elif self.compiled:
             self._do(MOVE)
-        elif self.port.coupling != NO_COUPLING and not self._move(self.world, self.state, self.port):
+        elif self.port.coupling != NO_COUPLING and not self._move(
+            self.world, self.state, self.port
+        ):
             raise IapbError(FAILURES[DEVICE_NOT_FINITE])
         self.steps_done += 1
         return copied_step(self.system, self.state)
 
     def _do(self, part: int) -> None:
         """Do one part of a compiled step."""
-        _, status = self._steps(self.world, self.state, self.port, self._unwritten, part, self.steps_done, 1)
+        _, status = self._steps(
+            self.world, self.state, self.port, self._unwritten, part, self.steps_done, 1
+        )
         if status:
             raise IapbError(FAILURES[status])
 
@@ -169,7 +207,9 @@ class Simulation:
     def hold(self, hand_force: ArrayLike) -> None:
         """Set the force of the hand from now on; see `step`."""
         if self.system.tool_tree < 0:
-            raise ArgumentError("hand_force", hand_force, f"None: scene {self.scene.name} has no hand")
+            raise ArgumentError(
+                "hand_force", hand_force, f"None: scene {self.scene.name} has no hand"
+            )
         given = real_numbers(hand_force)
         force = np.zeros(0) if given is None else given.astype(np.float64)
         if force.shape not in ((3,), (6,)) or not np.all(np.isfinite(force)):
@@ -178,18 +218,23 @@ class Simulation:
         self.port.wrench[[0, 1, 5] if force.shape == (3,) else slice(None)] = force
 
     def _take(self, result: StepResult) -> None:
-        """Copy the result of a law written in Python into the state that the device and the record read."""
+        """Copy the result of a law written in Python into the state that the device and the record
+        read."""
         state, law = self.state, f"the law {self.law.name!r} returned"
         if not isinstance(result, StepResult):
             raise ArgumentError(f"{law} result", result, "a StepResult")
         if result.state not in (FREE, COLLIDING, RESTING):
             raise ArgumentError(f"{law} state", result.state, "FREE, COLLIDING or RESTING")
         logged = state.impacts.logged
-        for what, count, most in (("contact_count[0]", state.contact_count[0], len(state.contacts.gap)),
-                                  ("impacts.logged[0]", logged[0], len(state.impacts.rows))):
+        for what, count, most in (
+            ("contact_count[0]", state.contact_count[0], len(state.contacts.gap)),
+            ("impacts.logged[0]", logged[0], len(state.impacts.rows)),
+        ):
             if not 0 <= count <= most:
                 state.contact_count[0] = logged[0] = 0
-                raise ArgumentError(f"{law} {what}", int(count), f"a count from 0 to {most}, the size of its buffer")
+                raise ArgumentError(
+                    f"{law} {what}", int(count), f"a count from 0 to {most}, the size of its buffer"
+                )
         vectors = {name: np.asarray(getattr(result, name)) for name in _STEP_VECTORS}
         for name, values in vectors.items():
             target = getattr(state, name)
@@ -212,7 +257,9 @@ class Simulation:
         if self.link is None and port.coupling != NO_COUPLING:
             self._move.taking(*blocks)
         frozen = getattr(getattr(self.law, "__dataclass_params__", None), "frozen", False)
-        if frozen and self.link is None:  # a law in Python without a state of its own takes a first step, then undone
+        if (
+            frozen and self.link is None
+        ):  # a law in Python without a state of its own takes a first step, then undone
             arrays = [*self.state.arrays(), *self.port.arrays()]
             before = [array.copy() for array in arrays]
             with suppress(IapbError):  # the first step will say so
@@ -222,10 +269,13 @@ class Simulation:
             self.steps_done = 0
 
     def advance_chunk(self, record: Any, steps: int) -> tuple[int, BaseException | None]:
-        """Do and record up to `steps` steps; return the number done, and the exception that stopped them or None."""
+        """Do and record up to `steps` steps; return the number done, and the exception that stopped
+        them or None."""
         if self.compiled and self.link is None:
             planned, stop = self._plan(steps)
-            done, status = self._steps(self.world, self.state, self.port, record, WHOLE, self.steps_done, planned)
+            done, status = self._steps(
+                self.world, self.state, self.port, record, WHOLE, self.steps_done, planned
+            )
             self.steps_done += done
             return done, IapbError(FAILURES[status]) if status else stop
         for k in range(steps):
@@ -241,45 +291,59 @@ class Simulation:
         return steps, None
 
     def _plan(self, steps: int) -> tuple[int, IapbError | None]:
-        """Give the compiled loop the hand's force of each step; return the number of valid steps and the error."""
+        """Give the compiled loop the hand's force of each step; return the number of valid steps
+        and the error."""
         self.port.planned[:steps] = self.port.wrench
         for k in range(steps if self._planned else 0):
             try:
-                self.port.planned[k] = wrench_of(self.scene, (self.steps_done + k + 0.5) * self.system.dt)
+                self.port.planned[k] = wrench_of(
+                    self.scene, (self.steps_done + k + 0.5) * self.system.dt
+                )
             except IapbError as stop:
                 return k, stop
         return steps, None
 
 
-def simulate(scene: Scene | str | Path, law: ContactLaw | Engine | None = None, coupling: Coupling | None = None, *,
-             world: str = "", steps: int | None = None, every: int = 1,
-             progress: Callable[[int, int], None] | None = None, max_memory: float | None = None) -> Run:
+def simulate(
+    scene: Scene | str | Path,
+    law: ContactLaw | Engine | None = None,
+    coupling: Coupling | None = None,
+    *,
+    world: str = "",
+    steps: int | None = None,
+    every: int = 1,
+    progress: Callable[[int, int], None] | None = None,
+    max_memory: float | None = None,
+) -> Run:
     """Simulate a scene in a named world, or with a contact law and a coupling, and return the run.
 
     Parameters
     ----------
     scene : Scene, the path of a scene file, or the name of a scene of the project.
-    law, coupling : see `Simulation`; without both, those of the world. An engine (`iapb.engines`) in place of the law
-        simulates the scene by its own method, without coupling.
-    world : ``"IAPB"``, ``"PB"`` or another name of `iapb.worlds`, which selects the law, and the coupling with the
-        scene's gains; default: IAPB, as in `iapb run`. If `law` is given, it is only a name for the record; default
-        then: the names of law and coupling.
+    law, coupling : see `Simulation`; without both, those of the world. An engine (`iapb.engines`)
+        in place of the law simulates the scene by its own method, without coupling.
+    world : ``"IAPB"``, ``"PB"`` or another name of `iapb.worlds`, which selects the law, and the
+        coupling with the scene's gains; default: IAPB, as in `iapb run`. If `law` is given, it is
+        only a name for the record; default then: the names of law and coupling.
     steps : number of steps, at least 1; default: the scene's duration times its rate.
-    every : N thins the record: it keeps every N-th step, each step with an impact, all impacts and the state at the
-        end. Energies and distrust are those of all steps. For runs whose record would not fit in memory.
+    every : N thins the record: it keeps every N-th step, each step with an impact, all impacts and
+        the state at the end. Energies and distrust are those of all steps. For runs whose record
+        would not fit in memory.
     progress : called as progress(steps done, total steps) after every chunk.
-    max_memory : largest size of the record [bytes]; ``math.inf`` for no limit; default: half of the machine's memory.
+    max_memory : largest size of the record [bytes]; ``math.inf`` for no limit; default: half of the
+        machine's memory.
 
     Returns
     -------
     Run
-        ``complete`` is False if the loop was interrupted (Ctrl-C) or failed, and ``stopped`` says why. The arrays then
-        end at the last complete chunk or step.
+        ``complete`` is False if the loop was interrupted (Ctrl-C) or failed, and ``stopped`` says
+        why. The arrays then end at the last complete chunk or step.
 
     Raises
     ------
     SceneError, ArgumentError
-        The scene or the arguments are invalid, or the record would exceed `max_memory`; nothing is allocated yet.
+        The scene or the arguments are invalid, or the record would exceed `max_memory`; nothing is
+        allocated yet.
     IapbError, KeyboardInterrupt
         The run stopped before its first step was done, so there is nothing to return.
     """
@@ -287,9 +351,18 @@ def simulate(scene: Scene | str | Path, law: ContactLaw | Engine | None = None, 
         ("world", world, isinstance(world, str), "the name of a world, as text"),
         ("steps", steps, steps is None or _is_positive(steps, Integral), "a whole number >= 1"),
         ("every", every, _is_positive(every, Integral), "a whole number >= 1"),
-        ("progress", progress, progress is None or callable(progress), "a function of the steps done and the total"),
-        ("max_memory", max_memory, max_memory is None or _is_positive(max_memory, Real),
-         "a number of bytes > 0; math.inf for no limit"),
+        (
+            "progress",
+            progress,
+            progress is None or callable(progress),
+            "a function of the steps done and the total",
+        ),
+        (
+            "max_memory",
+            max_memory,
+            max_memory is None or _is_positive(max_memory, Real),
+            "a number of bytes > 0; math.inf for no limit",
+        ),
     ):
         if not fine:
             raise ArgumentError(name, value, expected)
@@ -304,7 +377,9 @@ def simulate(scene: Scene | str | Path, law: ContactLaw | Engine | None = None, 
             raise ArgumentError("every", every, f"1: {law.name} records every step")
         started = perf_counter()
         run = law.run(scene, steps, progress)
-        seconds = run.chunk_seconds if run.chunk_seconds.any() else np.array([perf_counter() - started])
+        seconds = (
+            run.chunk_seconds if run.chunk_seconds.any() else np.array([perf_counter() - started])
+        )
         return replace(run, world=world or law.name, chunk_seconds=seconds)
     contact_law: Any = law
     simulation = Simulation(system_of(scene), contact_law, coupling)
@@ -321,7 +396,8 @@ def _is_positive(value: Any, kind: Any) -> bool:
 
 
 def _scene_at(path: Path) -> Scene:
-    """Return the scene of a file, cached by its text; a scene with a robot is read again, for its URDF may change."""
+    """Return the scene of a file, cached by its text; a scene with a robot is read again, for its
+    URDF may change."""
     text = b"urdf"  # of a file that cannot be read: `load_scene` raises the right error
     with suppress(OSError):
         text = path.read_bytes()
@@ -333,8 +409,11 @@ def _scene_of(path: Path, text: bytes) -> Scene:
     return load_scene(path)
 
 
-def record(recording: Recorder, total: int, progress: Callable[[int, int], None] | None = None) -> str:
-    """Simulate up to `total` steps, chunk by chunk; return why the run stopped early, or "" if it did not.
+def record(
+    recording: Recorder, total: int, progress: Callable[[int, int], None] | None = None
+) -> str:
+    """Simulate up to `total` steps, chunk by chunk; return why the run stopped early, or "" if it
+    did not.
 
     progress : see `simulate`.
 
@@ -358,7 +437,8 @@ def record(recording: Recorder, total: int, progress: Callable[[int, int], None]
 
 
 def _check_memory(each: int, steps: int, every: int, most: float | None) -> None:
-    """Raise an ArgumentError if the kept steps take more than `most` bytes; default: half of the machine's memory."""
+    """Raise an ArgumentError if the kept steps take more than `most` bytes; default: half of the
+    machine's memory."""
     if most is None:
         most = 4e9  # if the system does not report it
         with suppress(AttributeError, ValueError, OSError):
@@ -366,10 +446,15 @@ def _check_memory(each: int, steps: int, every: int, most: float | None) -> None
     size = -(-steps // every) * each
     if size > most:
         fits = -(-steps * each // max(int(most), 1))
-        raise ArgumentError("steps", steps, f"at most {int(most / each) * every:,}: the record takes {each} bytes a "
-                            f"step and more with contacts, {_bytes(size)} in all, of {_bytes(most)} that it may take. "
-                            f"every={fits} (iapb run --every {fits}) keeps one step of {fits} and fits; "
-                            "max_memory=math.inf takes the limit away")
+        raise ArgumentError(
+            "steps",
+            steps,
+            f"at most {int(most / each) * every:,}: the record takes {each} bytes a "
+            f"step and more with contacts, {_bytes(size)} in all, of {_bytes(most)} that it may "
+            f"take. "
+            f"every={fits} (iapb run --every {fits}) keeps one step of {fits} and fits; "
+            "max_memory=math.inf takes the limit away",
+        )
 
 
 def _bytes(count: float) -> str:
@@ -384,4 +469,6 @@ def require_complete(run: Run) -> Run:
         return run
     if run.stopped == INTERRUPTED:
         raise KeyboardInterrupt
-    raise IapbError(f"{run.scene_name} in the world {run.world} stopped after {run.time[-1]:g} s: {run.stopped}")
+    raise IapbError(
+        f"{run.scene_name} in the world {run.world} stopped after {run.time[-1]:g} s: {run.stopped}"
+    )

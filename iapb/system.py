@@ -36,9 +36,22 @@ from iapb.schema import blank, quantities, zeros_of
 _factored = Entry(cholesky)
 
 # Effects whose kernels are compiled only where they are on.
-_COMPILED = ("impact_friction", "friction", "unequal_restitution", "joint_damping", "clustering", "joint_limits")
-_CONTACT_NUMBERS = ("stiffness", "damping", "friction_velocity", "approach_velocity", "cluster_distance",
-                    "coherence_distance")
+_COMPILED = (
+    "impact_friction",
+    "friction",
+    "unequal_restitution",
+    "joint_damping",
+    "clustering",
+    "joint_limits",
+)
+_CONTACT_NUMBERS = (
+    "stiffness",
+    "damping",
+    "friction_velocity",
+    "approach_velocity",
+    "cluster_distance",
+    "coherence_distance",
+)
 
 
 class System:
@@ -68,7 +81,10 @@ class System:
         self.pairs = scene_parts.pairs_of(scene, self.shapes)
         self.stops = scene_parts.stops_of(scene, self.mechanism)
         self.capacity = contact_capacity(self.shapes, self.pairs) + len(self.stops.bound)
-        self.joint_damping, self.start = scene_parts.joint_damping_of(scene), scene_parts.start_of(scene)
+        self.joint_damping, self.start = (
+            scene_parts.joint_damping_of(scene),
+            scene_parts.start_of(scene),
+        )
         self.restitutions = scene_parts.restitutions_of(scene, self.pairs)
         self.frictions = scene_parts.frictions_of(scene)
         self.dt = 1.0 / scene.rate
@@ -88,7 +104,8 @@ class System:
         return self.mechanism.alone(self.tool_tree)
 
     def contacts_at(self, q: ArrayLike, margin: float = 0.0) -> ContactBuffer:
-        """Return the contacts with gap <= `margin` [m] (infinity allowed) at configuration q, from geometry alone.
+        """Return the contacts with gap <= `margin` [m] (infinity allowed) at configuration q, from
+        geometry alone.
 
         Raises
         ------
@@ -101,7 +118,15 @@ class System:
             raise ArgumentError("margin", margin, "a distance in metres, infinity allowed")
         buffer, count = zeros_of(ContactBuffer, contact=self.capacity), 0
         if len(self.pairs):
-            count = int(detect(block(self.shapes), self.pairs, *self.mechanism.placements(q), float(margin), buffer))
+            count = int(
+                detect(
+                    block(self.shapes),
+                    self.pairs,
+                    *self.mechanism.placements(q),
+                    float(margin),
+                    buffer,
+                )
+            )
         if count < 0:
             raise IapbError(STATUS_TEXT[TOO_MANY_CONTACTS])
         return ContactBuffer(*(column[:count] for column in buffer))  # type: ignore[arg-type]
@@ -113,40 +138,73 @@ class System:
         """
         return self.engine_under(law, effects)[0]
 
-    def engine_under(self, law: Any, effects: Sequence[Effect] | None = None) -> tuple[World, Entry]:
-        """Return the parameters of the scene with the switches of its effects under a law, and the step; made once."""
-        scene, contact, mechanism, law = self.scene, self.scene.contact, self.mechanism, law.within(self.scene)
+    def engine_under(
+        self, law: Any, effects: Sequence[Effect] | None = None
+    ) -> tuple[World, Entry]:
+        """Return the parameters of the scene with the switches of its effects under a law, and the
+        step; made once."""
+        scene, contact, mechanism, law = (
+            self.scene,
+            self.scene.contact,
+            self.mechanism,
+            law.within(self.scene),
+        )
         key = law.impulses, law.integrator, law.rendering, law.friction_in_impacts, law.pushing
         if key in self._worlds:
             return self._worlds[key]
-        limit, on = np.full(mechanism.nv, np.inf), active_names(self.decide(law) if effects is None else effects)
+        limit, on = (
+            np.full(mechanism.nv, np.inf),
+            active_names(self.decide(law) if effects is None else effects),
+        )
         scaled = "device_limits" in on and law.rendering in ("scale", "spread")
         if scaled and scene.device is not None:
             limit[slice(*self.tool_dofs)] = scene.device.force_limit
         switches = Switches(
-            **{name: flag(name in on) if name in _COMPILED else name in on
-               for name in Switches._fields if name in EFFECT_NAMES},
-            pushing=flag(law.impulses and law.pushing), impulse_limit=scaled,
+            **{
+                name: flag(name in on) if name in _COMPILED else name in on
+                for name in Switches._fields
+                if name in EFFECT_NAMES
+            },
+            pushing=flag(law.impulses and law.pushing),
+            impulse_limit=scaled,
             spreading=scaled and law.rendering == "spread",
-            contacts=not on.isdisjoint(("wall_contacts", "body_contacts", "self_collisions", "joint_limits")),
+            contacts=not on.isdisjoint(
+                ("wall_contacts", "body_contacts", "self_collisions", "joint_limits")
+            ),
             supports=flag(contact.forces == "implicit" and self.capacity > 1),
         )
         ranges = np.array(mechanism.tree_dofs, np.int64).reshape(-1, 2)
-        world: Any = block(World(
-            mechanism=mechanism.block, shapes=self.shapes, pairs=self.pairs,
-            broad_phase=make_broad_phase(self.shapes, self.pairs),
-            tree_of_body=mechanism.tree_of_body, tree_start=np.ascontiguousarray(ranges[:, 0]),
-            tree_stop=np.ascontiguousarray(ranges[:, 1]), switches=switches, dt=self.dt, gravity=self.gravity,
-            **{name: float(getattr(contact, name)) for name in _CONTACT_NUMBERS}, clamped=contact.penalty == "clamped",
-            friction_class=self.frictions.class_of_shape, friction=self.frictions.table,
-            implicit=flag(contact.forces == "implicit"), explicit=flag(contact.forces != "implicit"),
-            tangents=self.tangents,
-            restitution=float(self.restitutions[0] if len(self.restitutions) == 1 else contact.restitution),
-            own_restitution=scene_parts.restitution_by_shape(scene),
-            per_body_rows=contact.self_collision_rows == "per_body",
-            joint_damping=self.joint_damping, stops=self.stops, impulse_limit=limit,
-            conserving=law.integrator == "momentum", free=make_free_motion(mechanism.arrays, mechanism.tree_of_body),
-        ))
+        world: Any = block(
+            World(
+                mechanism=mechanism.block,
+                shapes=self.shapes,
+                pairs=self.pairs,
+                broad_phase=make_broad_phase(self.shapes, self.pairs),
+                tree_of_body=mechanism.tree_of_body,
+                tree_start=np.ascontiguousarray(ranges[:, 0]),
+                tree_stop=np.ascontiguousarray(ranges[:, 1]),
+                switches=switches,
+                dt=self.dt,
+                gravity=self.gravity,
+                **{name: float(getattr(contact, name)) for name in _CONTACT_NUMBERS},
+                clamped=contact.penalty == "clamped",
+                friction_class=self.frictions.class_of_shape,
+                friction=self.frictions.table,
+                implicit=flag(contact.forces == "implicit"),
+                explicit=flag(contact.forces != "implicit"),
+                tangents=self.tangents,
+                restitution=float(
+                    self.restitutions[0] if len(self.restitutions) == 1 else contact.restitution
+                ),
+                own_restitution=scene_parts.restitution_by_shape(scene),
+                per_body_rows=contact.self_collision_rows == "per_body",
+                joint_damping=self.joint_damping,
+                stops=self.stops,
+                impulse_limit=limit,
+                conserving=law.integrator == "momentum",
+                free=make_free_motion(mechanism.arrays, mechanism.tree_of_body),
+            )
+        )
         return self._worlds.setdefault(key, (world, Entry(advance)))
 
     def make_state(self) -> Any:
@@ -156,69 +214,122 @@ class System:
         largest = max((stop - start for start, stop in mechanism.tree_dofs), default=0)
         per_body = contact.self_collision_rows == "per_body"
         rows = c * (2 if per_body else 1)  # (13)-(14): two each
-        sliding = scene.largest_friction > 0.0 and not per_body  # per-body rows have no slip: no friction in impacts
+        sliding = (
+            scene.largest_friction > 0.0 and not per_body
+        )  # per-body rows have no slip: no friction in impacts
         soft = contact.forces == "implicit"
         log = blank(quantities(ImpactTable)[1:], {"impact": trees, "velocity": d})
-        for name, value in {"scale": 1, "clamp": 1, "friction_share": 1, "solved": 1, "approaching": -1}.items():
+        for name, value in {
+            "scale": 1,
+            "clamp": 1,
+            "friction_share": 1,
+            "solved": 1,
+            "approaching": -1,
+        }.items():
             log[name][:] = value  # where a law written in Python does not set it
         state = State(
-            **blank(quantities(State), {"coordinate": mechanism.nq, "velocity": d, "tree": trees, "row": rows}),
-            body=make_workspace(len(mechanism.bodies), d), contacts=zeros_of(ContactBuffer, contact=c),
-            previous=zeros_of(ContactBuffer, contact=c), scratch_contacts=zeros_of(ContactBuffer, contact=c),
-            work=zeros_of(ImpactWork, velocity=d, row=rows), push_work=zeros_of(PushWork, velocity=d, row=rows),
-            friction_work=zeros_of(FrictionWork, velocity=d * sliding, row=rows * sliding,
-                                   tangent=rows * tangents * sliding, direction=tangents),
-            rest_work=zeros_of(RestWork, velocity=d * soft, contact=c * soft, row=c * (1 + tangents) * soft,
-                               width=2 * largest, tree=trees),
+            **blank(
+                quantities(State),
+                {"coordinate": mechanism.nq, "velocity": d, "tree": trees, "row": rows},
+            ),
+            body=make_workspace(len(mechanism.bodies), d),
+            contacts=zeros_of(ContactBuffer, contact=c),
+            previous=zeros_of(ContactBuffer, contact=c),
+            scratch_contacts=zeros_of(ContactBuffer, contact=c),
+            work=zeros_of(ImpactWork, velocity=d, row=rows),
+            push_work=zeros_of(PushWork, velocity=d, row=rows),
+            friction_work=zeros_of(
+                FrictionWork,
+                velocity=d * sliding,
+                row=rows * sliding,
+                tangent=rows * tangents * sliding,
+                direction=tangents,
+            ),
+            rest_work=zeros_of(
+                RestWork,
+                velocity=d * soft,
+                contact=c * soft,
+                row=c * (1 + tangents) * soft,
+                width=2 * largest,
+                tree=trees,
+            ),
             impacts={"logged": np.zeros(1, np.int64), **log},
         )
         state.q[:], state.v[:] = self.start
         state.mass_matrix[:] = mechanism.mass_matrix(state.q)
         if _factored(state.mass_matrix, state.lower):
-            raise ArgumentError("scene", scene.name, "bodies whose mass matrix is positive definite at the start")
+            raise ArgumentError(
+                "scene", scene.name, "bodies whose mass matrix is positive definite at the start"
+            )
         state.group_of_tree[:] = state.island_of_tree[:] = np.arange(trees)
         state.located_q[:] = np.nan
         return block(state)
 
-    def make_port(self, coupling: Coupling, effects: Sequence[Effect] | None = None, external: bool = False) -> Any:
-        """Return hand, coupling and device at the scene's start, the device at the tool's position and velocity.
+    def make_port(
+        self, coupling: Coupling, effects: Sequence[Effect] | None = None, external: bool = False
+    ) -> Any:
+        """Return hand, coupling and device at the scene's start, the device at the tool's position
+        and velocity.
 
-        `effects` is the result of `decide` for the law; default: for ImpulseAugmented(). An `external` device moves by
-        itself: its delay and sensor resolution are its own, so the port adds neither.
+        `effects` is the result of `decide` for the law; default: for ImpulseAugmented(). An
+        `external` device moves by itself: its delay and sensor resolution are its own, so the port
+        adds neither.
         """
         scene, hand, settings, d = self.scene, self.scene.hand, self.scene.device, self.mechanism.nv
         if hand is None and not isinstance(coupling, NoCoupling):
-            raise ArgumentError("coupling", coupling.name, f"none: scene {scene.name} has no hand, so no device")
+            raise ArgumentError(
+                "coupling", coupling.name, f"none: scene {scene.name} has no hand, so no device"
+            )
         on = active_names(self.decide(ImpulseAugmented(), coupling) if effects is None else effects)
         on -= {"delay", "quantisation"} if external else set()
         device = self.mechanism if hand is None else self.device_mechanism()
         (v_start, v_stop), (q_start, q_stop) = self.tool_dofs, self.tool_coordinates
-        lengths = {"velocity": d, "tool": v_stop - v_start, "tool_coordinate": q_stop - q_start,
-                   "tool_body": len(device.bodies),
-                   "slot": 1 + (settings.delay if settings and "delay" in on else 0),
-                   "planned": PLANNED if hand is not None and hand.changes else 0}
+        lengths = {
+            "velocity": d,
+            "tool": v_stop - v_start,
+            "tool_coordinate": q_stop - q_start,
+            "tool_body": len(device.bodies),
+            "slot": 1 + (settings.delay if settings and "delay" in on else 0),
+            "planned": PLANNED if hand is not None and hand.changes else 0,
+        }
         port = Port(
-            **blank(quantities(Port), lengths), coupling=coupling.kind,
-            device=flag(not isinstance(coupling, NoCoupling)), hand=flag(hand is not None), tool_tree=self.tool_tree,
-            q_start=q_start, q_stop=q_stop, v_start=v_start, v_stop=v_stop,
+            **blank(quantities(Port), lengths),
+            coupling=coupling.kind,
+            device=flag(not isinstance(coupling, NoCoupling)),
+            hand=flag(hand is not None),
+            tool_tree=self.tool_tree,
+            q_start=q_start,
+            q_stop=q_stop,
+            v_start=v_start,
+            v_stop=v_stop,
             hand_body=-1 if hand is None else self.mechanism.index(hand.body),
             device_body=-1 if hand is None else device.index(hand.body),
-            mechanism=device.block, body=make_workspace(len(device.bodies), device.nv),
-            varying_inertia=not device.has_constant_mass_matrix, quantised="quantisation" in on,
+            mechanism=device.block,
+            body=make_workspace(len(device.bodies), device.nv),
+            varying_inertia=not device.has_constant_mass_matrix,
+            quantised="quantisation" in on,
             free=make_free_motion(device.arrays, device.tree_of_body),
         )
         for name, values in coupling.settings.items():
             if len(values) != lengths["tool"]:  # else the kernels would read past the end
-                raise ArgumentError(f"coupling {name}", values,
-                                    f"{lengths['tool']} values, one for each coordinate of the tool")
+                raise ArgumentError(
+                    f"coupling {name}",
+                    values,
+                    f"{lengths['tool']} values, one for each coordinate of the tool",
+                )
             getattr(port, name)[:] = values
         port.device_q[:] = port.sensed_q[:] = port.measured_q[:] = self.start[0][q_start:q_stop]
         port.device_v[:] = self.start[1][v_start:v_stop]
         port.force_limit[:] = np.inf
-        for effect, array, values in () if settings is None else (
+        for effect, array, values in (
+            ()
+            if settings is None
+            else (
                 ("device_limits", port.force_limit, settings.force_limit),
                 ("device_damping", port.device_damping, settings.damping),
-                ("quantisation", port.resolution, settings.position_resolution)):
+                ("quantisation", port.resolution, settings.position_resolution),
+            )
+        ):
             if effect in on:
                 array[:] = values
         if hand is not None:
@@ -229,15 +340,19 @@ class System:
         return block(port)
 
     def decide(self, law: Any, coupling: Coupling | None = None) -> tuple[Effect, ...]:
-        """Return the effects under a law and a coupling; the world, the port and the record are made from them."""
+        """Return the effects under a law and a coupling; the world, the port and the record are
+        made from them."""
         return decide_for(self.scene, self.mechanism, self.shapes, self.pairs, law, coupling)
 
 
-_SYSTEMS: dict[int, System] = {}  # the last used ones, by the identity of the scene, which the system keeps alive
+_SYSTEMS: dict[
+    int, System
+] = {}  # the last used ones, by the identity of the scene, which the system keeps alive
 
 
 def system_of(scene: Scene) -> System:
-    """Return the system of a scene, cached by the scene's identity; neither of them ever changes."""
+    """Return the system of a scene, cached by the scene's identity; neither of them ever
+    changes."""
     found = _SYSTEMS.pop(id(scene), None)
     _SYSTEMS[id(scene)] = found = System(scene) if found is None else found
     for old in [*_SYSTEMS][:-8]:  # of a list, for another thread may change it meanwhile
@@ -246,15 +361,20 @@ def system_of(scene: Scene) -> System:
 
 
 def coupling_of(scene: Scene, name: str) -> Coupling:
-    """Return the coupling `none`, `four-channel` or `unilateral` with the gains of the scene (Table I)."""
+    """Return the coupling `none`, `four-channel` or `unilateral` with the gains of the scene (Table
+    I)."""
     if name == "none":
         return NoCoupling()
     kinds: dict[str, type[FourChannel | UnilateralCoupler]] = {
-        "four-channel": FourChannel, "unilateral": UnilateralCoupler}
+        "four-channel": FourChannel,
+        "unilateral": UnilateralCoupler,
+    }
     if name not in kinds:
         raise ArgumentError("coupling", name, "one of none, four-channel, unilateral")
     field = name.replace("-", "_")
     gains = getattr(scene.couplings, field)
     if gains is None:
-        raise ArgumentError("coupling", name, f"a scene with couplings.{field}; {scene.name} gives no gains for it")
+        raise ArgumentError(
+            "coupling", name, f"a scene with couplings.{field}; {scene.name} gives no gains for it"
+        )
     return kinds[name](tuple(gains.stiffness), tuple(gains.damping))

@@ -1,4 +1,5 @@
-"""Thin the record of a long run: keep every N-th step, each step with an impact, and the state at the end.
+"""Thin the record of a long run: keep every N-th step, each step with an impact, and the state at
+the end.
 
 Energies, distrust and poses are computed from all steps, piece by piece, before a piece is thinned.
 """
@@ -24,8 +25,9 @@ _IMPACTS = tuple(each.name for each in quantities(ImpactTable))
 class Thinned:
     """The kept steps of consecutive pieces of a run.
 
-    Kept step i begins at ``time[i]`` in the state ``q[i]``, ``v[i]``. An impact counts the kept steps, so ``q[step]``
-    is the configuration in which it happened. A sum of energy in entry i reaches up to ``time[i + 1]``.
+    Kept step i begins at ``time[i]`` in the state ``q[i]``, ``v[i]``. An impact counts the kept
+    steps, so ``q[step]`` is the configuration in which it happened. A sum of energy in entry i
+    reaches up to ``time[i + 1]``.
 
     Parameters
     ----------
@@ -43,7 +45,8 @@ class Thinned:
 
         Parameters
         ----------
-        piece : consecutive steps of a run, from step `first` on; its impacts have the numbers of the run's steps
+        piece : consecutive steps of a run, from step `first` on; its impacts have the numbers of
+            the run's steps
         before : sums of energy at its start (see `iapb.mechanics.energy.last_of`)
         last : whether the run ends with this piece, so that its last state is kept
         """

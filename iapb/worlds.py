@@ -30,19 +30,23 @@ class World(NamedTuple):
     coupling: str
 
     def coupling_in(self, scene: Scene) -> Coupling:
-        """Return the coupling with the scene's gains, or no coupling if the scene has no hand or no gains."""
+        """Return the coupling with the scene's gains, or no coupling if the scene has no hand or no
+        gains."""
         gains = scene.couplings
         without = scene.hand is None or (gains.four_channel is None and gains.unilateral is None)
         return coupling_of(scene, "none" if without else self.coupling)
 
 
 def _augmented(name: str, **settings: Any) -> Callable[[str], World]:
-    return lambda rendering: World(name, ImpulseAugmented(rendering=rendering, **settings), "four-channel")
+    return lambda rendering: World(
+        name, ImpulseAugmented(rendering=rendering, **settings), "four-channel"
+    )
 
 
 # name -> function of the rendering (how IAPB respects the device's limits) that returns the world
 WORLDS: dict[str, Callable[[str], World]] = {
-    "IAPB": _augmented("IAPB"), "PB": lambda rendering: World("PB", Penalty(), "four-channel"),
+    "IAPB": _augmented("IAPB"),
+    "PB": lambda rendering: World("PB", Penalty(), "four-channel"),
     "IAPB-friction": _augmented("IAPB-friction", friction_in_impacts=True),
     "IAPB-push": _augmented("IAPB-push", pushing=True),
 }
@@ -54,7 +58,8 @@ def find_world(name: str, rendering: str = "full") -> World:
     Parameters
     ----------
     name : a key of `WORLDS`, or an engine of one's own as ``package.module:engine``
-    rendering : how IAPB respects the device's limits: full (ignores them), saturate, scale or spread
+    rendering : how IAPB respects the device's limits: full (ignores them), saturate, scale or
+        spread
 
     Raises
     ------
@@ -64,10 +69,14 @@ def find_world(name: str, rendering: str = "full") -> World:
     if name not in WORLDS and ":" not in name:
         load_extensions("iapb.worlds")
         if name not in WORLDS:
-            raise ArgumentError("world", name, f"{one_of(name, WORLDS)}, or your engine as module:engine")
+            raise ArgumentError(
+                "world", name, f"{one_of(name, WORLDS)}, or your engine as module:engine"
+            )
     world = WORLDS[name](rendering) if name in WORLDS else World(name, _engine_named(name), "none")
     if rendering != "full" and getattr(world.law, "rendering", "full") != rendering:
-        raise ArgumentError("rendering", rendering, f"full: the law of the world {name} has no impulses to fit")
+        raise ArgumentError(
+            "rendering", rendering, f"full: the law of the world {name} has no impulses to fit"
+        )
     return world
 
 
@@ -76,6 +85,8 @@ def _engine_named(name: str) -> Engine:
     found: Any = object_named("world", name, "module:engine")
     engine: Any = found() if isinstance(found, type) else found
     if not is_engine(engine):
-        raise ArgumentError("world", name, "an engine: an object with name, settings, ignored(scene) and run(scene)")
+        raise ArgumentError(
+            "world", name, "an engine: an object with name, settings, ignored(scene) and run(scene)"
+        )
     made: Engine = engine
     return made

@@ -1,12 +1,15 @@
-"""Contacts of the rigid worlds in closed form: circles, convex polygons and half-planes; balls, boxes and half-spaces.
+"""Contacts of the rigid worlds in closed form: circles, convex polygons and half-planes; balls,
+boxes and half-spaces.
 
-This module has the engine's conventions (unit normal from b into a, gap along it, point midway, same choice of points
-for face on face) but shares no code with it. It computes everything in the world frame, searches all edges for a
-polygon's nearest point, and clips faces of boxes by Sutherland and Hodgman. Sums thus have a different order, and a
-fault in one implementation shows as a difference (`verification.mechanics.against_pinocchio.scene_difference`).
+This module has the engine's conventions (unit normal from b into a, gap along it, point midway,
+same choice of points for face on face) but shares no code with it. It computes everything in the
+world frame, searches all edges for a polygon's nearest point, and clips faces of boxes by
+Sutherland and Hodgman. Sums thus have a different order, and a fault in one implementation shows as
+a difference (`verification.mechanics.against_pinocchio.scene_difference`).
 
-The normal of two polygons or boxes is the axis of largest separation. For flush pairs, separations agree up to
-rounding, so differences below TIE of the size count as equal. Then b's edge, or a's face, has priority.
+The normal of two polygons or boxes is the axis of largest separation. For flush pairs, separations
+agree up to rounding, so differences below TIE of the size count as equal. Then b's edge, or a's
+face, has priority.
 """
 
 from __future__ import annotations
@@ -23,15 +26,21 @@ from reference import Floats
 Integers = NDArray[np.int32]
 
 ROUNDING = 1e-12  # share of the size within which points coincide
-TIE = 1e-14  # share of the size within which separations count as equal; a tilt of 1e-6 already exceeds it
-# The engine's conventions for boxes: two edges give the normal only if they overlap by this share less than faces do;
-# edges with a smaller sine between them count as parallel; at most four points of a patch are kept.
+# share of the size within which separations count as equal; a tilt of 1e-6 already exceeds it
+TIE = 1e-14
+# The engine's conventions for boxes: two edges give the normal only if they overlap by this share
+# less than faces do; edges with a smaller sine between them count as parallel; at most four points
+# of a patch are kept.
 EDGE_SHARE, PARALLEL, MOST_POINTS = 0.05, 1e-6, 4
-FACE_SHARE, FACES_COSINE = 1e-4, 0.9999  # the second box's parallel face must overlap less by this share to decide
+FACE_SHARE, FACES_COSINE = (
+    1e-4,
+    0.9999,
+)  # the second box's parallel face must overlap less by this share to decide
 
 
 class Contacts(NamedTuple):
-    """c contacts: shapes, bodies (-1 = the world), feature (c,); point, normal (c, 3); gap (c,) [m]."""
+    """c contacts: shapes, bodies (-1 = the world), feature (c,); point, normal (c, 3); gap (c,)
+    [m]."""
 
     shape_a: Integers
     shape_b: Integers
@@ -43,24 +52,63 @@ class Contacts(NamedTuple):
     gap: Floats
 
 
-def find_contacts(shapes: Shapes, pairs: NDArray[np.int32], axes: Floats, origins: Floats, margin: float) -> Contacts:
-    """Return the contacts with gap <= margin [m], for axes (n + 1, 3, 3), origins (n + 1, 3) of bodies and world."""
+def find_contacts(
+    shapes: Shapes, pairs: NDArray[np.int32], axes: Floats, origins: Floats, margin: float
+) -> Contacts:
+    """Return the contacts with gap <= margin [m], for axes (n + 1, 3, 3), origins (n + 1, 3) of
+    bodies and world."""
     first = pairs[:, 0]
-    room = 16 + int(np.where(shapes.kind[first] == BOX, 8, np.maximum(shapes.count[first], 2)).sum())
+    room = 16 + int(
+        np.where(shapes.kind[first] == BOX, 8, np.maximum(shapes.count[first], 2)).sum()
+    )
     ids, values = np.empty((room, 3), np.int64), np.empty((room, 7))
-    corners, center, frames = _placed(shapes.kind, shapes.first, shapes.count, shapes.body, shapes.vertices,
-                                      shapes.center, shapes.axes, axes, origins)  # fmt: skip
-    count = _find(shapes.kind, shapes.radius, shapes.first, shapes.count, corners, center, frames, shapes.half_size,
-                  pairs, float(margin), ids, values)  # fmt: skip
+    corners, center, frames = _placed(
+        shapes.kind,
+        shapes.first,
+        shapes.count,
+        shapes.body,
+        shapes.vertices,
+        shapes.center,
+        shapes.axes,
+        axes,
+        origins,
+    )
+    count = _find(
+        shapes.kind,
+        shapes.radius,
+        shapes.first,
+        shapes.count,
+        corners,
+        center,
+        frames,
+        shapes.half_size,
+        pairs,
+        float(margin),
+        ids,
+        values,
+    )
     a, b = ids[:count, 0].astype(np.int32), ids[:count, 1].astype(np.int32)
-    return Contacts(a, b, shapes.body[a], shapes.body[b], ids[:count, 2], values[:count, :3], values[:count, 3:6],
-                    values[:count, 6])  # fmt: skip
+    return Contacts(
+        a,
+        b,
+        shapes.body[a],
+        shapes.body[b],
+        ids[:count, 2],
+        values[:count, :3],
+        values[:count, 3:6],
+        values[:count, 6],
+    )
 
 
 @numba.njit(cache=True, fastmath=False)
 def _placed(kind, first, count, body, vertices, center, frames, axes, origins):  # type: ignore[no-untyped-def]
-    """Return corners, centres and axes of all shapes in the world; the second row of a half-plane is a direction."""
-    corners, centers, turned = np.zeros((len(vertices), 3)), np.zeros((len(kind), 3)), np.zeros((len(kind), 3, 3))
+    """Return corners, centres and axes of all shapes in the world; the second row of a half-plane
+    is a direction."""
+    corners, centers, turned = (
+        np.zeros((len(vertices), 3)),
+        np.zeros((len(kind), 3)),
+        np.zeros((len(kind), 3, 3)),
+    )
     for s in range(len(kind)):
         own, origin = axes[body[s]], origins[body[s]]
         for i in range(3):
@@ -77,9 +125,13 @@ def _placed(kind, first, count, body, vertices, center, frames, axes, origins): 
 
 
 @numba.njit(cache=True, fastmath=False)
-def _find(kind, radius, first, count, corners, center, axes, half, pairs, margin, ids, values):  # type: ignore[no-untyped-def]
+def _find(  # type: ignore[no-untyped-def]
+    kind, radius, first, count, corners, center, axes, half, pairs, margin, ids, values
+):
     """Write the contacts of all pairs; return their number."""
-    n = np.int64(0)  # numba would compile every function that takes n twice: for the literal 0, and for a variable
+    n = np.int64(
+        0
+    )  # numba would compile every function that takes n twice: for the literal 0, and for a variable
     for k in range(len(pairs)):
         a, b, start = pairs[k, 0], pairs[k, 1], n
         ka, kb = kind[a], kind[b]
@@ -90,19 +142,31 @@ def _find(kind, radius, first, count, corners, center, axes, half, pairs, margin
             n = _points_on_plane(pa, radius[a], pb[0], pb[1], margin, ids, values, n)
         elif kb == HALF_SPACE:
             spread = np.zeros((1, 3)) if ka == SPHERE else _box_corners(axes[a], half[a])
-            n = _points_on_plane(x + spread, radius[a], y, axes[b, :, 2].copy(), margin, ids, values, n)
+            n = _points_on_plane(
+                x + spread, radius[a], y, axes[b, :, 2].copy(), margin, ids, values, n
+            )
         elif round_a and round_b:
             otherwise = np.zeros(3)
             otherwise[1 if ka == CIRCLE else 2] = 1.0 if a < b else -1.0
             n = _balls(x, radius[a], y, radius[b], otherwise, margin, ids, values, n)
         elif round_a:
-            nearest = _nearest_on_polygon(pb, x) if ka == CIRCLE else _nearest_on_box(y, axes[b], half[b], x)
+            nearest = (
+                _nearest_on_polygon(pb, x)
+                if ka == CIRCLE
+                else _nearest_on_box(y, axes[b], half[b], x)
+            )
             n = _ball_on(nearest, x, radius[a], 1.0, margin, ids, values, n)
         elif round_b:
-            nearest = _nearest_on_polygon(pa, y) if kb == CIRCLE else _nearest_on_box(x, axes[a], half[a], y)
+            nearest = (
+                _nearest_on_polygon(pa, y)
+                if kb == CIRCLE
+                else _nearest_on_box(x, axes[a], half[a], y)
+            )
             n = _ball_on(nearest, y, radius[b], -1.0, margin, ids, values, n)
         elif ka == BOX:
-            n = _boxes(center[a], axes[a], half[a], center[b], axes[b], half[b], margin, ids, values, n)
+            n = _boxes(
+                center[a], axes[a], half[a], center[b], axes[b], half[b], margin, ids, values, n
+            )
         else:
             n = _polygons(pa, pb, margin, ids, values, n)
         ids[start:n, 0], ids[start:n, 1] = a, b
@@ -118,7 +182,8 @@ def _store(ids, values, n, feature, point, normal, gap):  # type: ignore[no-unty
 
 @numba.njit(cache=True, fastmath=False)
 def _feature(kind, one, other):  # type: ignore[no-untyped-def]
-    """Return the number of two features; kind 0: corner of a on face of b, 1: reverse, 2: two corners or edges."""
+    """Return the number of two features; kind 0: corner of a on face of b, 1: reverse, 2: two
+    corners or edges."""
     return (kind * 100_000 + one) * 100_000 + other
 
 
@@ -128,20 +193,31 @@ def _points_on_plane(points, radius, origin, normal, margin, ids, values, n):  #
     for i in range(len(points)):
         gap = np.sum((points[i] - origin) * normal) - radius
         if gap <= margin:
-            n = _store(ids, values, n, _feature(0, i, 0), points[i] - (radius + 0.5 * gap) * normal, normal, gap)
+            n = _store(
+                ids,
+                values,
+                n,
+                _feature(0, i, 0),
+                points[i] - (radius + 0.5 * gap) * normal,
+                normal,
+                gap,
+            )
     return n
 
 
 @numba.njit(cache=True, fastmath=False)
 def _balls(x, radius_x, y, radius_y, otherwise, margin, ids, values, n):  # type: ignore[no-untyped-def]
-    """Write the contact of two circles or balls; `otherwise` is the normal if the centres coincide."""
+    """Write the contact of two circles or balls; `otherwise` is the normal if the centres
+    coincide."""
     apart = x - y
     distance = np.sqrt(np.sum(apart * apart))
     gap = distance - (radius_x + radius_y)
     if gap > margin:
         return n
     normal = apart / distance if distance > 0.0 else otherwise
-    return _store(ids, values, n, 0, y + 0.5 * (distance + radius_y - radius_x) * normal, normal, gap)
+    return _store(
+        ids, values, n, 0, y + 0.5 * (distance + radius_y - radius_x) * normal, normal, gap
+    )
 
 
 @numba.njit(cache=True, fastmath=False)
@@ -151,7 +227,9 @@ def _ball_on(nearest, middle, radius, sign, margin, ids, values, n):  # type: ig
     gap = distance - radius
     if gap > margin:
         return n
-    return _store(ids, values, n, feature, middle - (radius + 0.5 * gap) * normal, sign * normal, gap)
+    return _store(
+        ids, values, n, feature, middle - (radius + 0.5 * gap) * normal, sign * normal, gap
+    )
 
 
 @numba.njit(cache=True, fastmath=False)
@@ -167,7 +245,8 @@ def _edges(polygon):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, fastmath=False)
 def _nearest_on_polygon(polygon, x):  # type: ignore[no-untyped-def]
-    """Return direction from the polygon to a point, signed distance and feature; inside, those of the nearest edge."""
+    """Return direction from the polygon to a point, signed distance and feature; inside, those of
+    the nearest edge."""
     normals, lengths = _edges(polygon)
     inner, edge = -np.inf, 0
     for i in range(len(polygon)):
@@ -201,7 +280,8 @@ def _along(axes, x):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, fastmath=False)
 def _nearest_on_box(center, axes, half, x):  # type: ignore[no-untyped-def]
-    """Return direction from the box to a point, signed distance and feature; inside, those of the nearest face."""
+    """Return direction from the box to a point, signed distance and feature; inside, those of the
+    nearest face."""
     local = _along(axes, x - center)
     beyond = np.abs(local) - half
     if beyond.max() <= 0.0:
@@ -222,7 +302,11 @@ def _box_corners(axes, half):  # type: ignore[no-untyped-def]
     """Return the corners (8, 3) relative to the centre."""
     corners = np.empty((8, 3))
     for i in range(8):
-        along, up, out = (1 - 2 * (i & 1)) * half[0], (1 - (i & 2)) * half[1], (1 - (i & 4) // 2) * half[2]
+        along, up, out = (
+            (1 - 2 * (i & 1)) * half[0],
+            (1 - (i & 2)) * half[1],
+            (1 - (i & 4) // 2) * half[2],
+        )
         for x in range(3):
             corners[i, x] = along * axes[x, 0] + up * axes[x, 1] + out * axes[x, 2]
     return corners
@@ -243,19 +327,50 @@ def _best_edge(onto, normals, other):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, fastmath=False)
 def _polygons(a, b, margin, ids, values, n):  # type: ignore[no-untyped-def]
-    """Write contacts of two convex polygons: the incident edge over the reference edge, or two corners."""
+    """Write contacts of two convex polygons: the incident edge over the reference edge, or two
+    corners."""
     (normals_a, lengths_a), (normals_b, lengths_b) = _edges(a), _edges(b)
     size = lengths_a.max() + lengths_b.max()
     (over_a, edge_a), (over_b, edge_b) = _best_edge(a, normals_a, b), _best_edge(b, normals_b, a)
     if max(over_a, over_b) > margin:
         return n
     if over_a > over_b + TIE * size:
-        return _over_edge(a, normals_a, lengths_a, edge_a, over_a, b, normals_b, -1.0, size, margin, ids, values, n)
-    return _over_edge(b, normals_b, lengths_b, edge_b, over_b, a, normals_a, 1.0, size, margin, ids, values, n)
+        return _over_edge(
+            a,
+            normals_a,
+            lengths_a,
+            edge_a,
+            over_a,
+            b,
+            normals_b,
+            -1.0,
+            size,
+            margin,
+            ids,
+            values,
+            n,
+        )
+    return _over_edge(
+        b, normals_b, lengths_b, edge_b, over_b, a, normals_a, 1.0, size, margin, ids, values, n
+    )
 
 
 @numba.njit(cache=True, fastmath=False)
-def _over_edge(ref, normals, lengths, edge, separation, other, normals_other, sign, size, margin, ids, values, n):  # type: ignore[no-untyped-def]
+def _over_edge(  # type: ignore[no-untyped-def]
+    ref,
+    normals,
+    lengths,
+    edge,
+    separation,
+    other,
+    normals_other,
+    sign,
+    size,
+    margin,
+    ids,
+    values,
+    n,
+):
     """Write the contacts over the reference edge; sign 1 if the edge belongs to b."""
     m, length, k = normals[edge], lengths[edge], len(other)
     t = np.array([-m[1], m[0], 0.0])
@@ -266,7 +381,10 @@ def _over_edge(ref, normals, lengths, edge, separation, other, normals_other, si
     vertex = np.array([incident, (incident + 1) % k])
     s, h, cut = np.empty(2), np.empty(2), np.zeros(2, np.bool_)
     for e in range(2):  # the incident edge runs against the reference edge: s[0] >= s[1]
-        s[e], h[e] = np.sum((other[vertex[e]] - ref[edge]) * t), np.sum((other[vertex[e]] - ref[edge]) * m)
+        s[e], h[e] = (
+            np.sum((other[vertex[e]] - ref[edge]) * t),
+            np.sum((other[vertex[e]] - ref[edge]) * m),
+        )
     missed, lowest = s[0] < 0.0 or s[1] > length, 0 if h[0] < h[1] else 1
     slope = (h[1] - h[0]) / (s[1] - s[0]) if s[0] != s[1] else 0.0
     low_s = s[lowest]
@@ -284,7 +402,9 @@ def _over_edge(ref, normals, lengths, edge, separation, other, normals_other, si
             if cut[e]:
                 corner = (edge + 1) % len(ref) if e == 0 else edge
                 feature = _feature(1 if sign > 0.0 else 0, corner, incident)
-            n = _store(ids, values, n, feature, ref[edge] + s[e] * t + 0.5 * h[e] * m, sign * m, h[e])
+            n = _store(
+                ids, values, n, feature, ref[edge] + s[e] * t + 0.5 * h[e] * m, sign * m, h[e]
+            )
     return n
 
 
@@ -301,14 +421,24 @@ def _corners(ref, other, sign, margin, ids, values, n):  # type: ignore[no-untyp
     if best > margin:
         return n
     feature = _feature(2, j, i) if sign > 0.0 else _feature(2, i, j)
-    return _store(ids, values, n, feature, 0.5 * (ref[i] + other[j]), sign * (other[j] - ref[i]) / best, best)
+    return _store(
+        ids, values, n, feature, 0.5 * (ref[i] + other[j]), sign * (other[j] - ref[i]) / best, best
+    )
 
 
 @numba.njit(cache=True, fastmath=False)
 def _boxes(center_a, A, half_a, center_b, B, half_b, margin, ids, values, n):  # type: ignore[no-untyped-def]
-    """Write contacts of two boxes: by the axis of largest separation among 15, a clipped face or two edges."""
+    """Write contacts of two boxes: by the axis of largest separation among 15, a clipped face or
+    two edges."""
     apart, size = center_a - center_b, half_a.sum() + half_b.sum()
-    face, edge_i, edge_j, best, most, edge_best = np.int64(-1), np.int64(0), np.int64(0), -np.inf, -np.inf, -np.inf
+    face, edge_i, edge_j, best, most, edge_best = (
+        np.int64(-1),
+        np.int64(0),
+        np.int64(0),
+        -np.inf,
+        -np.inf,
+        -np.inf,
+    )
     for k in range(6):
         m = A[:, k].copy() if k < 3 else B[:, k - 3].copy()
         separation = abs(np.sum(apart * m)) - _reach(A, half_a, m) - _reach(B, half_b, m)
@@ -329,10 +459,16 @@ def _boxes(center_a, A, half_a, center_b, B, half_b, margin, ids, values, n):  #
     if max(most, edge_best) > margin:
         return n
     if edge_best > most + EDGE_SHARE * abs(most) + ROUNDING * size:
-        return _two_edges(center_a, A, half_a, edge_i, center_b, B, half_b, edge_j, edge_best, ids, values, n)
+        return _two_edges(
+            center_a, A, half_a, edge_i, center_b, B, half_b, edge_j, edge_best, ids, values, n
+        )
     if face < 3:
-        return _clipped_face(center_a, A, half_a, face, center_b, B, half_b, -1.0, best, margin, ids, values, n)
-    return _clipped_face(center_b, B, half_b, face - 3, center_a, A, half_a, 1.0, best, margin, ids, values, n)
+        return _clipped_face(
+            center_a, A, half_a, face, center_b, B, half_b, -1.0, best, margin, ids, values, n
+        )
+    return _clipped_face(
+        center_b, B, half_b, face - 3, center_a, A, half_a, 1.0, best, margin, ids, values, n
+    )
 
 
 @numba.njit(cache=True, fastmath=False)
@@ -353,10 +489,16 @@ def _two_edges(center_a, A, half_a, i, center_b, B, half_b, j, gap, ids, values,
     for k in range(3):
         if k != i:
             side = np.sum(A[:, k] * m) < 0.0
-            x, number_a = x + (half_a[k] if side else -half_a[k]) * A[:, k], 2 * number_a + int(side)
+            x, number_a = (
+                x + (half_a[k] if side else -half_a[k]) * A[:, k],
+                2 * number_a + int(side),
+            )
         if k != j:
             side = np.sum(B[:, k] * m) > 0.0
-            y, number_b = y + (half_b[k] if side else -half_b[k]) * B[:, k], 2 * number_b + int(side)
+            y, number_b = (
+                y + (half_b[k] if side else -half_b[k]) * B[:, k],
+                2 * number_b + int(side),
+            )
     cosine, along_u, along_w = np.sum(u * w), np.sum((x - y) * u), np.sum((x - y) * w)
     s = (cosine * along_w - along_u) / (1.0 - cosine**2)
     t = (along_w - cosine * along_u) / (1.0 - cosine**2)
@@ -366,8 +508,11 @@ def _two_edges(center_a, A, half_a, i, center_b, B, half_b, j, gap, ids, values,
 
 
 @numba.njit(cache=True, fastmath=False)
-def _clipped_face(center, axes, half, face, center_o, axes_o, half_o, sign, separation, margin, ids, values, n):  # type: ignore[no-untyped-def]
-    """Write the corners of the incident face clipped to the reference face (four at most); sign 1 if that is b's."""
+def _clipped_face(  # type: ignore[no-untyped-def]
+    center, axes, half, face, center_o, axes_o, half_o, sign, separation, margin, ids, values, n
+):
+    """Write the corners of the incident face clipped to the reference face (four at most); sign 1
+    if that is b's."""
     apart, k1, k2 = center_o - center, (face + 1) % 3, (face + 2) % 3
     m, u, w = axes[:, face].copy(), axes[:, k1].copy(), axes[:, k2].copy()
     outward = np.sum(apart * m) >= 0.0
@@ -400,13 +545,16 @@ def _clipped_face(center, axes, half, face, center_o, axes_o, half_o, sign, sepa
     if n == start:
         x, y = min(max(deepest[0], -half[k1]), half[k1]), min(max(deepest[1], -half[k2]), half[k2])
         point = center + half[face] * m + x * u + y * w + 0.5 * separation * m
-        return _store(ids, values, n, _feature(0 if sign > 0.0 else 1, faces, 99), point, sign * m, separation)
+        return _store(
+            ids, values, n, _feature(0 if sign > 0.0 else 1, faces, 99), point, sign * m, separation
+        )
     return _widest(ids, values, start, n, m) if n - start > MOST_POINTS else n
 
 
 @numba.njit(cache=True, fastmath=False)
 def _cut(patch, lines, length, axis, sign, limit, border):  # type: ignore[no-untyped-def]
-    """Clip a polygon in place to sign x[axis] <= limit; return its number of corners. The border is line 4 + border."""
+    """Clip a polygon in place to sign x[axis] <= limit; return its number of corners. The border is
+    line 4 + border."""
     old, tags, found = patch[:length].copy(), lines[:length].copy(), 0
     for c in range(length):
         d = (c + 1) % length
@@ -418,14 +566,17 @@ def _cut(patch, lines, length, axis, sign, limit, border):  # type: ignore[no-un
             shared = tags[c, 1]  # the edge from corner c to the next
             patch[found] = old[c] + before / (before - after) * (old[d] - old[c])
             patch[found, axis] = sign * limit
-            lines[found, 0], lines[found, 1] = (shared, 4 + border) if before < 0.0 else (4 + border, shared)
+            lines[found, 0], lines[found, 1] = (
+                (shared, 4 + border) if before < 0.0 else (4 + border, shared)
+            )
             found += 1
     return found
 
 
 @numba.njit(cache=True, fastmath=False)
 def _widest(ids, values, start, n, m):  # type: ignore[no-untyped-def]
-    """Keep the deepest contact, the one farthest from it, and the farthest on each side of the line through both."""
+    """Keep the deepest contact, the one farthest from it, and the farthest on each side of the line
+    through both."""
     chosen = np.empty(MOST_POINTS, np.int64)
     chosen[0] = start + int(np.argmin(values[start:n, 6]))
     x, best = values[chosen[0], :3].copy(), -1.0

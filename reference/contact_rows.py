@@ -1,7 +1,8 @@
 """Contacts of a system as rows, gaps and velocities, and their record after a step.
 
-Rows nᵀ(J_a − J_b), (11)-(12), are built from Pinocchio's frame Jacobians of the bodies and the contacts of
-`reference.contact_finding`. Nothing here calls the engine's mechanics or its narrow phase.
+Rows nᵀ(J_a − J_b), (11)-(12), are built from Pinocchio's frame Jacobians of the bodies and the
+contacts of `reference.contact_finding`. Nothing here calls the engine's mechanics or its narrow
+phase.
 """
 
 from __future__ import annotations
@@ -50,31 +51,51 @@ def find_rows(system: Any, q: Floats, v: Floats, margin: float) -> ContactRows:
     return ContactRows(geometry, rows, geometry.gap, rows @ v)
 
 
-def _with_stops(geometry: Contacts, system: Any, q: Floats, origins: Floats, frames: Floats, margin: float) -> Contacts:
-    """Append the joint limits with gap <= margin [m], as contacts on an arm that the joint rotates."""
+def _with_stops(
+    geometry: Contacts, system: Any, q: Floats, origins: Floats, frames: Floats, margin: float
+) -> Contacts:
+    """Append the joint limits with gap <= margin [m], as contacts on an arm that the joint
+    rotates."""
     stops = system.stops
     gap = stops.arm * stops.sign * (q[stops.coordinate] - stops.bound)
     kept = np.flatnonzero(gap <= margin)
     body, parent, dof = stops.body[kept], stops.parent[kept], stops.dof[kept]
-    turning, sliding = frames[body, 3:, dof], frames[body, :3, dof]  # relative to the parent, at unit joint velocity
+    turning, sliding = (
+        frames[body, 3:, dof],
+        frames[body, :3, dof],
+    )  # relative to the parent, at unit joint velocity
     turns = np.linalg.norm(turning, axis=1) > 0.5
     axis = np.where(turns[:, None], turning, sliding)
     lever = unit_tangents(axis, spatial=True)[:, 0]
     normal = np.where(turns[:, None], np.cross(axis, lever), axis) * stops.sign[kept, None]
     point = origins[body] + np.where(turns, stops.arm[kept], 0.0)[:, None] * lever
     shape, feature = stops.shape[kept].astype(np.int32), np.zeros(len(kept), np.int64)
-    own = (shape, shape, body.astype(np.int32), parent.astype(np.int32), feature, point, normal, gap[kept])
+    own = (
+        shape,
+        shape,
+        body.astype(np.int32),
+        parent.astype(np.int32),
+        feature,
+        point,
+        normal,
+        gap[kept],
+    )
     columns: list[Any] = [np.concatenate([geometry[k], column]) for k, column in enumerate(own)]
     return Contacts(*columns)
 
 
-def contact_jacobian(directions: Floats, geometry: Contacts, origins: Floats, frames: Floats) -> Floats:
-    """Return the rows (c, d) of the velocity of a relative to b along directions n (c, 3); mere rounding becomes 0.
+def contact_jacobian(
+    directions: Floats, geometry: Contacts, origins: Floats, frames: Floats
+) -> Floats:
+    """Return the rows (c, d) of the velocity of a relative to b along directions n (c, 3); mere
+    rounding becomes 0.
 
-    With a body's frame Jacobian (J_v, J_ω) and r from its origin to the point, nᵀJ = nᵀJ_v + (r × n)ᵀJ_ω.
-    origins (n + 1, 3), frames (n + 1, 6, d) : those of the bodies and, last, of the world
+    With a body's frame Jacobian (J_v, J_ω) and r from its origin to the point, nᵀJ = nᵀJ_v + (r ×
+    n)ᵀJ_ω. origins (n + 1, 3), frames (n + 1, 6, d) : those of the bodies and, last, of the world
     """
-    return np.asarray(_rows(directions, geometry.point, geometry.body_a, geometry.body_b, origins, frames))
+    return np.asarray(
+        _rows(directions, geometry.point, geometry.body_a, geometry.body_b, origins, frames)
+    )
 
 
 @numba.njit(cache=True, fastmath=False)
@@ -87,12 +108,18 @@ def _rows(directions, points, bodies_a, bodies_b, origins, frames):  # type: ign
             body, sign = (bodies_a[c], 1.0) if side == 0 else (bodies_b[c], -1.0)
             x, y, z = points[c] - origins[body]
             along[:3] = n
-            along[3], along[4], along[5] = y * n[2] - z * n[1], z * n[0] - x * n[2], x * n[1] - y * n[0]
+            along[3], along[4], along[5] = (
+                y * n[2] - z * n[1],
+                z * n[0] - x * n[2],
+                x * n[1] - y * n[0],
+            )
             for k in range(d):
                 for i in range(6):
                     rows[c, k] += sign * along[i] * frames[body, i, k]
             reach = np.sqrt(x * x + y * y + z * z) + np.sqrt((points[c] ** 2).sum())
-            size += np.sqrt((frames[body, :3] ** 2).sum()) + reach * np.sqrt((frames[body, 3:] ** 2).sum())
+            size += np.sqrt((frames[body, :3] ** 2).sum()) + reach * np.sqrt(
+                (frames[body, 3:] ** 2).sum()
+            )
         for k in range(d):
             length += rows[c, k] ** 2
         if np.sqrt(length) <= ROW_NOISE * size:
@@ -108,31 +135,48 @@ def tangent_rows(system: Any, q: Floats, found: ContactRows) -> tuple[Floats, Fl
     normals = found.geometry.normal
     tangents = unit_tangents(normals, getattr(system.scene, "dimensions", 2) == 3)
     _, origins, frames = mechanics_of(system).bodies(q)
-    rows = [contact_jacobian(tangents[:, k], found.geometry, origins, frames) for k in range(tangents.shape[1])]
+    rows = [
+        contact_jacobian(tangents[:, k], found.geometry, origins, frames)
+        for k in range(tangents.shape[1])
+    ]
     return tangents, np.stack(rows, axis=1)
 
 
 def unit_tangents(normals: Floats, spatial: bool) -> Floats:
-    """Return unit tangents (c, s, 3) of normals (c, 3): z × n in the plane, two tangents in space."""
+    """Return unit tangents (c, s, 3) of normals (c, 3): z × n in the plane, two tangents in
+    space."""
     if not spatial:
         return np.cross([0.0, 0.0, 1.0], normals)[:, None]
-    least = np.eye(3)[np.argmin(np.abs(normals), axis=1)]  # the coordinate axis that is farthest from the normal
+    least = np.eye(3)[
+        np.argmin(np.abs(normals), axis=1)
+    ]  # the coordinate axis that is farthest from the normal
     first = np.cross(normals, least)
     first /= np.linalg.norm(first, axis=1)[:, None]
     return np.stack([first, np.cross(normals, first)], axis=1)
 
 
-def write_contacts(state: Any, found: ContactRows, blow: Floats, pushed: Floats, friction: Floats, dt: float) -> None:
+def write_contacts(
+    state: Any, found: ContactRows, blow: Floats, pushed: Floats, friction: Floats, dt: float
+) -> None:
     """Record in `state` the contacts that touch or carry an impulse.
 
     blow, pushed : (c,) impulses [N s]; `pushed` is recorded as forces
     friction : (c, 3) tangential impulses in world axes, recorded as forces
     """
     into, geometry, before = state.contacts, found.geometry, int(state.contact_count[0])
-    old = {*zip(*(getattr(into, name)[:before].tolist() for name in ("shape_a", "shape_b", "feature")), strict=True)}
+    old = {
+        *zip(
+            *(getattr(into, name)[:before].tolist() for name in ("shape_a", "shape_b", "feature")),
+            strict=True,
+        )
+    }
     kept = np.flatnonzero(~(found.gap > 0.0) | (blow > 0.0) | (pushed > 0.0))
-    columns = {**geometry._asdict(), "normal_velocity": found.gamma, "normal_force": pushed / dt,
-               "friction_force": friction / dt}  # fmt: skip
+    columns = {
+        **geometry._asdict(),
+        "normal_velocity": found.gamma,
+        "normal_force": pushed / dt,
+        "friction_force": friction / dt,
+    }
     for name, column in columns.items():
         getattr(into, name)[: len(kept)] = column[kept]
     names = zip(geometry.shape_a[kept], geometry.shape_b[kept], geometry.feature[kept], strict=True)
@@ -141,14 +185,21 @@ def write_contacts(state: Any, found: ContactRows, blow: Floats, pushed: Floats,
     state.contact_count[:] = len(kept), before
 
 
-def write_impact(state: Any, system: Any, v: Floats, mass: Floats, impulse: Floats, rows: Floats) -> None:
-    """Log the collision impulses of a step as one impact, from v before, mass matrix, impulse (d,) and rows (c, d)."""
+def write_impact(
+    state: Any, system: Any, v: Floats, mass: Floats, impulse: Floats, rows: Floats
+) -> None:
+    """Log the collision impulses of a step as one impact, from v before, mass matrix, impulse (d,)
+    and rows (c, d)."""
     log = state.impacts
     log.logged[0] = 0
     if not len(rows):
         return
     change = np.linalg.solve(mass, impulse)
-    log.group[0], log.rows[0], log.rank[0] = max(system.tool_tree, 0), len(rows), np.linalg.matrix_rank(rows)
+    log.group[0], log.rows[0], log.rank[0] = (
+        max(system.tool_tree, 0),
+        len(rows),
+        np.linalg.matrix_rank(rows),
+    )
     log.scale[0], log.clamp[0] = 1.0, 1.0
     log.v_minus[0], log.v_plus[0], log.impulse[0] = v, v + change, impulse
     log.energy_lost[0] = -float((v + 0.5 * change) @ impulse)

@@ -1,13 +1,15 @@
-"""Exact results for hard impacts in rational numbers (python-flint), and energy gains in double-double arithmetic.
+"""Exact results for hard impacts in rational numbers (python-flint), and energy gains in
+double-double arithmetic.
 
-Every finite double is a rational number, so an impact given in doubles has an exact outcome of (21),
-v⁺ = v − (1+e) M⁻¹Jᵀ(J M⁻¹Jᵀ)†J v = v − (1+e) M⁻¹Jₙᵀ(Jₙ M⁻¹Jₙᵀ)⁻¹Jₙ v, with Jₙ a maximal independent subset
-of the rows (33). The subset is found without rounding, so redundancy is decided exactly. Rows that are redundant only
-up to rounding are independent here; give fractions for exact redundancy.
+Every finite double is a rational number, so an impact given in doubles has an exact outcome of
+(21), v⁺ = v − (1+e) M⁻¹Jᵀ(J M⁻¹Jᵀ)†J v = v − (1+e) M⁻¹Jₙᵀ(Jₙ M⁻¹Jₙᵀ)⁻¹Jₙ v, with Jₙ a maximal
+independent subset of the rows (33). The subset is found without rounding, so redundancy is decided
+exactly. Rows that are redundant only up to rounding are independent here; give fractions for exact
+redundancy.
 
-For many impacts `bulk_energy_gain` judges energy in double-double arithmetic with a running error bound:
-2 (KE⁺ − KE⁻) = ΔᵀMs with Δ = v⁺ − v⁻ and s = v⁺ + v⁻, which are exact double-doubles, so the energies do not cancel.
-If M is not symmetric to the last bit, the formula is ½(ΔᵀMs + sᵀMΔ).
+For many impacts `bulk_energy_gain` judges energy in double-double arithmetic with a running error
+bound: 2 (KE⁺ − KE⁻) = ΔᵀMs with Δ = v⁺ − v⁻ and s = v⁺ + v⁻, which are exact double-doubles, so the
+energies do not cancel. If M is not symmetric to the last bit, the formula is ½(ΔᵀMs + sᵀMΔ).
 Source: Dekker, Numerische Mathematik 18 (1971); Ogita, Rump, Oishi, SIAM J. Sci. Comput. 26 (2005).
 """
 
@@ -31,7 +33,8 @@ _flint = cache(partial(needed, "flint", "Exact arithmetic"))
 
 _SPLITTER = 134217729.0  # 2^27 + 1: splits a double into two halves whose products are exact
 _ROUNDING = 2.0**-100  # bound of the error of one double-double operation, which is below 2^-102
-# Beyond these magnitudes the halves or the error terms leave the range of doubles; use exact arithmetic then.
+# Beyond these magnitudes the halves or the error terms leave the range of doubles; use exact
+# arithmetic then.
 _SMALLEST, _LARGEST = 1e-60, 1e60
 
 
@@ -57,13 +60,17 @@ class ExactImpact:
 
 
 def exact_impact(
-    mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity: ArrayLike, restitution: float | Fraction
+    mass_matrix: ArrayLike,
+    contact_jacobian: ArrayLike,
+    velocity: ArrayLike,
+    restitution: float | Fraction,
 ) -> ExactImpact:
     """Return the exact result of (21) for M (d, d), J (c, d), v (d,) and scalar e.
 
     Parameters
     ----------
-    mass_matrix, contact_jacobian, velocity : doubles or `fractions.Fraction`; M must be symmetric positive definite
+    mass_matrix, contact_jacobian, velocity : doubles or `fractions.Fraction`; M must be symmetric
+        positive definite
     restitution : e, one for all rows
 
     Raises
@@ -73,11 +80,18 @@ def exact_impact(
     """
     mass, v = rational_matrix("mass_matrix", mass_matrix), rational_matrix("velocity", velocity)
     jacobian = rational_matrix("contact_jacobian", contact_jacobian, mass.ncols())
-    e, chosen = rational_matrix("restitution", np.array([restitution]))[0, 0], independent_rows(contact_jacobian)
+    e, chosen = (
+        rational_matrix("restitution", np.array([restitution]))[0, 0],
+        independent_rows(contact_jacobian),
+    )
     impulse = v - v
     if chosen:
-        rows = type(mass)(len(chosen), mass.ncols(), [jacobian[i, j] for i in chosen for j in range(mass.ncols())])
-        impulse = rows.transpose() * (rows * mass.solve(rows.transpose())).solve(rows * v) * -(1 + e)
+        rows = type(mass)(
+            len(chosen), mass.ncols(), [jacobian[i, j] for i in chosen for j in range(mass.ncols())]
+        )
+        impulse = (
+            rows.transpose() * (rows * mass.solve(rows.transpose())).solve(rows * v) * -(1 + e)
+        )
     v_plus = v + mass.solve(impulse)
     before, after = (fractions_of(x.transpose() * mass * x)[0] / 2 for x in (v, v_plus))
     return ExactImpact(fractions_of(v_plus), fractions_of(impulse), chosen, before, after)
@@ -93,9 +107,11 @@ def independent_rows(contact_jacobian: ArrayLike) -> tuple[int, ...]:
 
 
 def relative_energy_gain(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -> float:
-    """Return (KE⁺ − KE⁻)/KE⁻ computed exactly from the given numbers and rounded, but no gain to 0; > 0 is a gain.
+    """Return (KE⁺ − KE⁻)/KE⁻ computed exactly from the given numbers and rounded, but no gain to 0;
+    > 0 is a gain.
 
-    If KE⁻ = 0, the result is 0 for KE⁺ = 0 and infinity otherwise. For many impacts see `bulk_energy_gain`.
+    If KE⁻ = 0, the result is 0 for KE⁺ = 0 and infinity otherwise. For many impacts see
+    `bulk_energy_gain`.
     """
     mass = rational_matrix("mass_matrix", mass_matrix)
     given = rational_matrix("v_minus", v_minus), rational_matrix("v_plus", v_plus)
@@ -115,9 +131,11 @@ def condition_number(mass_matrix: ArrayLike) -> float:
 
 
 def row_condition_number(mass_matrix: ArrayLike, contact_jacobian: ArrayLike) -> float:
-    """Return kappa(A) of A = J L⁻ᵀ, the largest over the smallest nonzero singular value; 1 without rows.
+    """Return kappa(A) of A = J L⁻ᵀ, the largest over the smallest nonzero singular value; 1 without
+    rows.
 
-    The singular values are the square roots of the nonzero eigenvalues of M⁻¹JᵀJ, which is rational.
+    The singular values are the square roots of the nonzero eigenvalues of M⁻¹JᵀJ, which is
+    rational.
     """
     mass = rational_matrix("mass_matrix", mass_matrix)
     jacobian = rational_matrix("contact_jacobian", contact_jacobian, mass.ncols())
@@ -126,12 +144,15 @@ def row_condition_number(mass_matrix: ArrayLike, contact_jacobian: ArrayLike) ->
 
 
 def rational_matrix(argument: str, value: ArrayLike, columns: int | None = None) -> Rational:
-    """Return `value` as a matrix of rationals, exactly; a vector becomes a column (unless `columns` is given)."""
+    """Return `value` as a matrix of rationals, exactly; a vector becomes a column (unless `columns`
+    is given)."""
     flint, array = _flint(), np.array(value, dtype=object)
     if array.ndim == 1:
         array = array.reshape(-1, 1) if columns is None else array.reshape(-1, columns)
     if array.ndim != 2 or columns not in (None, array.shape[1]):
-        raise ArgumentError(argument, array.shape, f"{columns} columns" if columns else "a vector or a matrix")
+        raise ArgumentError(
+            argument, array.shape, f"{columns} columns" if columns else "a vector or a matrix"
+        )
     try:
         fractions = [Fraction(x) for x in array.ravel()]
     except (OverflowError, ValueError, TypeError):
@@ -145,15 +166,19 @@ def fractions_of(matrix: Rational) -> tuple[Fraction, ...]:
 
 
 def _nonzero_eigenvalues(matrix: Rational) -> list[float]:
-    """Return the nonzero eigenvalues, ascending, of a matrix known to have real eigenvalues >= 0."""
+    """Return the nonzero eigenvalues, ascending, of a matrix known to have real eigenvalues >=
+    0."""
     roots = matrix.charpoly().complex_roots()
     return sorted(float(root.real.mid()) for root, _ in roots if not root.contains(0))
 
 
-def bulk_energy_gain(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -> tuple[Floats, Floats]:
+def bulk_energy_gain(
+    mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike
+) -> tuple[Floats, Floats]:
     """Return (gain, bound), each (n,): (KE⁺ − KE⁻)/KE⁻ per impact and a bound of its error.
 
-    Shapes: M (n, d, d) or (d, d), v⁻ and v⁺ (n, d). If KE⁻ is not positive, gain is NaN and bound infinity.
+    Shapes: M (n, d, d) or (d, d), v⁻ and v⁺ (n, d). If KE⁻ is not positive, gain is NaN and bound
+    infinity.
     """
     before, after = (np.atleast_2d(np.asarray(v, np.float64)) for v in (v_minus, v_plus))
     masses, (n, d) = np.asarray(mass_matrix, np.float64), before.shape
@@ -164,7 +189,9 @@ def bulk_energy_gain(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLi
     for argument, array in (("mass_matrix", masses), ("v_minus", before), ("v_plus", after)):
         size = np.abs(array)
         if not size.max(initial=0.0) <= _LARGEST or array[size < _SMALLEST].any():
-            expected = f"magnitudes in [{_SMALLEST:g}, {_LARGEST:g}] or 0; use relative_energy_gain beyond"
+            expected = (
+                f"magnitudes in [{_SMALLEST:g}, {_LARGEST:g}] or 0; use relative_energy_gain beyond"
+            )
             raise ArgumentError(argument, array, expected)
     gain, bound = np.empty(n), np.empty(n)
     if masses.ndim == 2:
@@ -213,7 +240,8 @@ def _multiply(ah, al, bh, bl):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, fastmath=False)
 def _bilinear(mass, ah, al, bh, bl):  # type: ignore[no-untyped-def]
-    """Return aᵀ M b as a double-double, and the sum of |a_i M_ij b_j|, for double-double vectors a and b."""
+    """Return aᵀ M b as a double-double, and the sum of |a_i M_ij b_j|, for double-double vectors a
+    and b."""
     high, low, size = 0.0, 0.0, 0.0
     for i in range(len(ah)):
         rh, rl = 0.0, 0.0
@@ -238,8 +266,13 @@ def _gains(masses, symmetric, before, after, gain, bound):  # type: ignore[no-un
             total[i], total_low[i] = _two_sum(after[k, i], before[k, i])
         change, low, size = _bilinear(masses[k], difference, difference_low, total, total_low)
         if not symmetric[k]:
-            turned, turned_low, turned_size = _bilinear(masses[k], total, total_low, difference, difference_low)
-            change, size = 0.5 * _add(change, low, turned, turned_low)[0], 0.5 * (size + turned_size)
+            turned, turned_low, turned_size = _bilinear(
+                masses[k], total, total_low, difference, difference_low
+            )
+            change, size = (
+                0.5 * _add(change, low, turned, turned_low)[0],
+                0.5 * (size + turned_size),
+            )
         energy, _, energy_size = _bilinear(masses[k], before[k], zero, before[k], zero)
         if not energy > d * d * _ROUNDING * energy_size:
             gain[k], bound[k] = np.nan, np.inf

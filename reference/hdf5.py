@@ -1,8 +1,10 @@
-"""What iapb reads of an HDF5 file: items that a format names, stored in the file itself, within a budget of bytes.
+"""What iapb reads of an HDF5 file: items that a format names, stored in the file itself, within a
+budget of bytes.
 
-HDF5 can refer to other files: by links, as storage of a dataset, or as parts of a virtual dataset. It opens them
-without asking, so a file could show the content of any file that the user may read. Therefore a reader opens only the
-items that its format names, each by `group_at`, `dataset_at` or `values_at`, and attributes by `attribute_of`.
+HDF5 can refer to other files: by links, as storage of a dataset, or as parts of a virtual dataset.
+It opens them without asking, so a file could show the content of any file that the user may read.
+Therefore a reader opens only the items that its format names, each by `group_at`, `dataset_at` or
+`values_at`, and attributes by `attribute_of`.
 """
 
 from __future__ import annotations
@@ -12,7 +14,8 @@ from pathlib import Path
 from typing import Any
 
 READ_BUDGET = 1 << 29  # bytes that one file may fill; a caller may allow more
-_PER_BYTE = 64  # a large file may fill so many bytes for each of its own; a run at rest is packed forty times
+# a large file may fill so many bytes for each of its own; a run at rest is packed forty times
+_PER_BYTE = 64
 _PACKERS = {1, 32000}  # HDF5's numbers of deflate and lzf
 _FILTERS = _PACKERS | {2, 3}  # also those that shuffle bytes and add checksums
 _MOST_PACKED = 1100  # largest expansion factor: deflate makes at most 1032 bytes of one
@@ -69,8 +72,8 @@ def dataset_at(group: Any, name: str, budget: Budget) -> Any:
     Raises
     ------
     ValueError
-        There is no such dataset, a link is on the way, its values are not in this file, or its size is beyond its
-        bytes or the budget.
+        There is no such dataset, a link is on the way, its values are not in this file, or its size
+        is beyond its bytes or the budget.
     """
     import h5py
 
@@ -83,12 +86,14 @@ def dataset_at(group: Any, name: str, budget: Budget) -> Any:
 
 
 def values_at(group: Any, name: str, budget: Budget) -> Any:
-    """Return a dataset as an array, a text or a tuple of texts; what it fills is taken from the budget.
+    """Return a dataset as an array, a text or a tuple of texts; what it fills is taken from the
+    budget.
 
     Raises
     ------
     ValueError
-        It cannot be opened (see `dataset_at`), holds neither numbers nor texts, or fills more than the budget.
+        It cannot be opened (see `dataset_at`), holds neither numbers nor texts, or fills more than
+        the budget.
     """
     import h5py
 
@@ -166,7 +171,8 @@ def _check_storage(dataset: Any) -> None:
 
 
 def _check_size(dataset: Any, budget: Budget) -> None:
-    """Raise ValueError if a dataset states more values than its bytes can hold, or a piece exceeds the budget."""
+    """Raise ValueError if a dataset states more values than its bytes can hold, or a piece exceeds
+    the budget."""
     name = dataset.name
     stored = dataset.id.get_storage_size()
     width = dataset.dtype.itemsize

@@ -1,20 +1,23 @@
 """MuJoCo as a world: any scene, written as a MuJoCo model and simulated by MuJoCo's own step.
 
-Bodies, joints, inertias, damping, limits and shapes are those of the scene. The model lists the pairs of shapes that
-can touch, so that each pair has the friction and the restitution that the scene gives it. Planar shapes become solid:
-circles become spheres, and boxes and polygons get a thickness along z, in which nothing can move.
+Bodies, joints, inertias, damping, limits and shapes are those of the scene. The model lists the
+pairs of shapes that can touch, so that each pair has the friction and the restitution that the
+scene gives it. Planar shapes become solid: circles become spheres, and boxes and polygons get a
+thickness along z, in which nothing can move.
 
-MuJoCo has no coefficient of restitution. Its contact is a spring and a damper per unit of effective mass,
+MuJoCo has no coefficient of restitution. Its contact is a spring and a damper per unit of effective
+mass,
 
     x'' = −k x − b x',      solref = (−k, −b),      k = (π / (N Δt))²,      b = 2 ζ √k,
 
-while it pushes. One rule gives k and b where e > 0. Half a period of the spring takes N = `impact_steps` steps, and ζ
-is the damping ratio whose spring returns the share e of the speed (`spring_restitution`). Where e = 0 the contact has
-the shortest time constant that MuJoCo accepts, 2 Δt, and is critically damped: solref = (2 Δt, 1). A spring that
-oscillates returns more than e⁻² = 0.135 of the speed. A smaller e > 0 becomes 0, and is named as ignored.
+while it pushes. One rule gives k and b where e > 0. Half a period of the spring takes N =
+`impact_steps` steps, and ζ is the damping ratio whose spring returns the share e of the speed
+(`spring_restitution`). Where e = 0 the contact has the shortest time constant that MuJoCo accepts,
+2 Δt, and is critically damped: solref = (2 Δt, 1). A spring that oscillates returns more than e⁻² =
+0.135 of the speed. A smaller e > 0 becomes 0, and is named as ignored.
 
-Source: T. Schwager and T. Pöschel, Coefficient of restitution and linear-dashpot model revisited, Granular Matter 9,
-2007.
+Source: T. Schwager and T. Pöschel, Coefficient of restitution and linear-dashpot model revisited,
+Granular Matter 9, 2007.
 """
 
 from __future__ import annotations
@@ -107,7 +110,8 @@ class MuJoCo:
         steps: int | None = None,
         progress: Callable[[int, int], None] | None = None,
     ) -> Run:
-        """Simulate a scene. A simulation that MuJoCo calls unstable, or that is interrupted, ends there."""
+        """Simulate a scene. A simulation that MuJoCo calls unstable, or that is interrupted, ends
+        there."""
         mujoco = _mujoco()
         model = self.model(scene)
         places = joint_places(scene, model)
@@ -215,7 +219,8 @@ def spring_restitution(damping_ratio: float) -> float:
 
 
 def damping_ratio_of(restitution: float) -> float:
-    """Return the damping ratio whose spring has this restitution, between LEAST_RESTITUTION and 1."""
+    """Return the damping ratio whose spring has this restitution, between LEAST_RESTITUTION and
+    1."""
     low, high = 0.0, 1.0
     for _ in range(60):
         middle = 0.5 * (low + high)
@@ -239,7 +244,8 @@ def _quaternion(rotation: Floats) -> Floats:
 def _add_body(parent: Any, body: Body, flat: bool) -> Any:
     """Add a body with its joint and inertia.
 
-    Moments of inertia about x and y do not matter in the plane; those of a ball are valid whatever the third is.
+    Moments of inertia about x and y do not matter in the plane; those of a ball are valid whatever
+    the third is.
     """
     rotation, position = body.placement
     made = parent.add_body(name=body.name, pos=position, quat=_quaternion(rotation))
@@ -302,7 +308,8 @@ def _add_geom(spec: Any, carrier: Any, shapes: Shapes, i: int) -> None:
 
 
 def _add_polygon(spec: Any, carrier: Any, corners: Floats, common: dict[str, Any]) -> None:
-    """Add a planar polygon with a thickness along z; a rectangle becomes a box, which MuJoCo's contacts like best."""
+    """Add a planar polygon with a thickness along z; a rectangle becomes a box, which MuJoCo's
+    contacts like best."""
     kinds = _mujoco().mjtGeom
     middle = corners.mean(axis=0)
     thick = 0.5 * float(np.linalg.norm(corners - middle, axis=1).max())
@@ -321,8 +328,8 @@ def _add_polygon(spec: Any, carrier: Any, corners: Floats, common: dict[str, Any
     carrier.add_geom(**common, type=kinds.mjGEOM_MESH, meshname=common["name"])
 
 
-# States. MuJoCo's quaternions are w, x, y, z, a continuous joint has one angle, and a free flyer's velocity is in the
-# axes of its joint.
+# States. MuJoCo's quaternions are w, x, y, z, a continuous joint has one angle, and a free flyer's
+# velocity is in the axes of its joint.
 
 
 def joint_places(scene: Scene, model: Any) -> list[JointPlace]:

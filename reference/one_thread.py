@@ -1,7 +1,9 @@
-"""Run BLAS on one thread for code that solves many small systems: laws at every step, timings, sweeps.
+"""Run BLAS on one thread for code that solves many small systems: laws at every step, timings,
+sweeps.
 
-OpenBLAS uses a pool of threads even for 12 unknowns. If other processes occupy the cores, each product waits for the
-pool: with four busy processes on two cores, the rigid world took four times as long, and longer with more processes.
+OpenBLAS uses a pool of threads even for 12 unknowns. If other processes occupy the cores, each
+product waits for the pool: with four busy processes on two cores, the rigid world took four times
+as long, and longer with more processes.
 """
 
 from __future__ import annotations
@@ -19,7 +21,8 @@ _limited: ContextVar[bool] = ContextVar("_limited", default=False)
 
 @cache
 def _controller() -> Any:
-    """Return the controller, made once: finding the loaded BLAS libraries takes 1 ms, setting their limit 30 µs."""
+    """Return the controller, made once: finding the loaded BLAS libraries takes 1 ms, setting their
+    limit 30 µs."""
     import numpy.linalg  # noqa: F401 - numpy and scipy bring a BLAS each, which is found only after it is loaded
 
     needed("scipy.linalg", "A reference")

@@ -1,4 +1,5 @@
-"""Random trees of rigid bodies and random states from a seed, for comparisons and property tests."""
+"""Random trees of rigid bodies and random states from a seed, for comparisons and property
+tests."""
 
 from __future__ import annotations
 
@@ -8,8 +9,8 @@ from iapb.mechanics.joints import KINDS
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
 from reference import Floats
 
-# Masses [kg] and radii of gyration [m] span these decades. A flat or rod-like body has a nearly singular inertia:
-# its second moments of mass go down to this share.
+# Masses [kg] and radii of gyration [m] span these decades. A flat or rod-like body has a nearly
+# singular inertia: its second moments of mass go down to this share.
 MASS_DECADES = (-3.0, 2.0)
 GYRATION_DECADES = (-2.0, 0.0)
 THINNEST = 1e-9
@@ -25,7 +26,8 @@ def random_rotation(rng: np.random.Generator) -> Floats:
 def random_inertia(rng: np.random.Generator, mass: float) -> Floats:
     """Return a physical inertia (3, 3) about the centre of mass, sometimes nearly singular.
 
-    It is made from second moments of mass s >= 0, with principal moments s_y + s_z, s_z + s_x and s_x + s_y.
+    It is made from second moments of mass s >= 0, with principal moments s_y + s_z, s_z + s_x and
+    s_x + s_y.
     """
     gyration = 10.0 ** rng.uniform(*GYRATION_DECADES)
     second = mass * gyration**2 * np.where(rng.random(3) < 0.3, THINNEST, rng.random(3))
@@ -37,7 +39,8 @@ def random_inertia(rng: np.random.Generator, mass: float) -> Floats:
 def random_mechanism(
     rng: np.random.Generator, joints: int, kinds: tuple[str, ...] = tuple(KINDS), trees: int = 1
 ) -> Mechanism:
-    """Return trees of `joints` bodies each, depth first, from chains to bushy trees, with `kinds` of joints."""
+    """Return trees of `joints` bodies each, depth first, from chains to bushy trees, with `kinds`
+    of joints."""
     bodies: list[Body] = []
     for tree in range(trees):
         chain: list[str] = []  # from the root to the newest body
@@ -45,10 +48,27 @@ def random_mechanism(
         for i in range(joints):
             while len(chain) > 1 and rng.random() < 0.7 * bushy:
                 chain.pop()
-            name, parent, kind = f"body {tree}.{i}", chain[-1] if chain else None, str(rng.choice(kinds))
+            name, parent, kind = (
+                f"body {tree}.{i}",
+                chain[-1] if chain else None,
+                str(rng.choice(kinds)),
+            )
             mass, (x, y, z) = 10.0 ** rng.uniform(*MASS_DECADES), rng.normal(size=3).tolist()
-            place, center = (random_rotation(rng), rng.normal(scale=0.5, size=3)), rng.normal(scale=0.3, size=3)
-            bodies.append(Body(name, parent, Joint(kind, (x, y, z)), place, mass, center, random_inertia(rng, mass)))
+            place, center = (
+                (random_rotation(rng), rng.normal(scale=0.5, size=3)),
+                rng.normal(scale=0.3, size=3),
+            )
+            bodies.append(
+                Body(
+                    name,
+                    parent,
+                    Joint(kind, (x, y, z)),
+                    place,
+                    mass,
+                    center,
+                    random_inertia(rng, mass),
+                )
+            )
             chain.append(name)
     return Mechanism(bodies)
 

@@ -1,7 +1,8 @@
 """Rigid-body dynamics by Pinocchio, for the rigid worlds and for comparison with the engine.
 
-A Pinocchio model is made from a Mechanism (`model_of`) or, independently of the engine's reader, from a URDF file by
-Pinocchio's own parser (`model_from_urdf`). `PinocchioMechanism` uses the engine's conventions.
+A Pinocchio model is made from a Mechanism (`model_of`) or, independently of the engine's reader,
+from a URDF file by Pinocchio's own parser (`model_from_urdf`). `PinocchioMechanism` uses the
+engine's conventions.
 """
 
 from __future__ import annotations
@@ -22,7 +23,11 @@ from reference import Floats
 
 # Joints whose coordinates are not the integrals of their velocities, by Pinocchio's class.
 _CONTINUOUS, _SPHERICAL, _FREE_FLYER = range(3)
-_TURNING = {"JointModelRUBZ": _CONTINUOUS, "JointModelSpherical": _SPHERICAL, "JointModelFreeFlyer": _FREE_FLYER}
+_TURNING = {
+    "JointModelRUBZ": _CONTINUOUS,
+    "JointModelSpherical": _SPHERICAL,
+    "JointModelFreeFlyer": _FREE_FLYER,
+}
 # A bias below this share of M |v|² in a few motions is rounding error: it is zero in every motion.
 _NO_BIAS, _MOTIONS = 1e-12, 4
 
@@ -31,7 +36,8 @@ _pinocchio = cache(partial(needed, "pinocchio", "The rigid-body reference"))
 
 
 class PinocchioMechanism:
-    """A Pinocchio model with the engine's interface (same q, v, shapes, units and axes as `Mechanism`).
+    """A Pinocchio model with the engine's interface (same q, v, shapes, units and axes as
+    `Mechanism`).
 
     Parameters
     ----------
@@ -42,12 +48,15 @@ class PinocchioMechanism:
         self.pin, self.model, self.data = _pinocchio(), model, model.createData()
         self.nq, self.nv = int(model.nq), int(model.nv)
         self._below = np.tril_indices(self.nv, -1)
-        body = self.pin.FrameType.BODY  # frames of the bodies, in the mechanism's order; the first frame is the world
+        body = (
+            self.pin.FrameType.BODY
+        )  # frames of the bodies, in the mechanism's order; the first frame is the world
         self._bodies = [k for k, frame in enumerate(model.frames) if k and frame.type == body]
         self._places = {model.frames[k].name: place for place, k in enumerate(self._bodies)}
 
     def mass_matrix(self, q: Floats) -> Floats:
-        """Return M(q) (d, d) by the composite rigid body algorithm, which fills the upper triangle."""
+        """Return M(q) (d, d) by the composite rigid body algorithm, which fills the upper
+        triangle."""
         mass = np.array(self.pin.crba(self.model, self.data, q))
         mass[self._below] = mass.T[self._below]
         return mass
@@ -70,16 +79,23 @@ class PinocchioMechanism:
         return np.array(self.pin.rnea(self.model, self.data, q, v, dv))
 
     def bodies(self, q: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return axes (n + 1, 3, 3), origins (n + 1, 3), Jacobians (n + 1, 6, d) of n bodies and, last, the world."""
+        """Return axes (n + 1, 3, 3), origins (n + 1, 3), Jacobians (n + 1, 6, d) of n bodies and,
+        last, the world."""
         self.pin.computeJointJacobians(self.model, self.data, q)
         self.pin.updateFramePlacements(self.model, self.data)
         n, world = len(self._bodies), self.pin.LOCAL_WORLD_ALIGNED
-        axes, origins, rows = np.zeros((n + 1, 3, 3)), np.zeros((n + 1, 3)), np.zeros((n + 1, 6, self.nv))
+        axes, origins, rows = (
+            np.zeros((n + 1, 3, 3)),
+            np.zeros((n + 1, 3)),
+            np.zeros((n + 1, 6, self.nv)),
+        )
         axes[n] = np.eye(3)
         for b, frame in enumerate(self._bodies):
             placed = self.data.oMf[frame]
             axes[b], origins[b] = placed.rotation, placed.translation
-            rows[b] = self.pin.getFrameJacobian(self.model, self.data, frame, world).reshape(6, self.nv)
+            rows[b] = self.pin.getFrameJacobian(self.model, self.data, frame, world).reshape(
+                6, self.nv
+            )
         return axes, origins, rows
 
     def kinetic_energy(self, q: Floats, v: Floats) -> float:
@@ -104,23 +120,30 @@ class PinocchioMechanism:
         return np.array(self.pin.normalize(self.model, q))
 
     def rate(self, q: Floats, v: Floats) -> Floats:
-        """Return dq/dt (nq,) of a motion with velocity v (d,) through q; this is v itself if nq = d."""
+        """Return dq/dt (nq,) of a motion with velocity v (d,) through q; this is v itself if nq =
+        d."""
         return v if self.nq == self.nv else np.asarray(_rates(self._layout, q, v))
 
     @cached_property
     def _layout(self) -> NDArray[np.int64]:
-        """Class (-1: dq/dt = v), first coordinate and first velocity (n, 3) of the joints, and a last row of ends."""
-        rows = [(_TURNING.get(joint.shortname(), -1), joint.idx_q, joint.idx_v) for joint in self.model.joints]
+        """Class (-1: dq/dt = v), first coordinate and first velocity (n, 3) of the joints, and a
+        last row of ends."""
+        rows = [
+            (_TURNING.get(joint.shortname(), -1), joint.idx_q, joint.idx_v)
+            for joint in self.model.joints
+        ]
         return np.array([*rows[1:], (-1, self.nq, self.nv)], np.int64)
 
     def free_acceleration(self, q: Floats, v: Floats) -> Floats:
-        """Return dv/dt = −M⁻¹ B (d,) of the motion without forces, by the articulated body algorithm."""
+        """Return dv/dt = −M⁻¹ B (d,) of the motion without forces, by the articulated body
+        algorithm."""
         self.model.gravity.linear = np.zeros(3)
         return np.array(self.pin.aba(self.model, self.data, q, v, np.zeros(self.nv)))
 
     @cached_property
     def has_bias(self) -> bool:
-        """Whether B(q, v) differs from zero in some motion, tried in a few random ones. Without, v stays constant."""
+        """Whether B(q, v) differs from zero in some motion, tried in a few random ones. Without, v
+        stays constant."""
         rng = np.random.default_rng(0)
         for _ in range(_MOTIONS):
             v = rng.normal(size=self.nv)
@@ -131,9 +154,12 @@ class PinocchioMechanism:
         return False
 
     def calls(self) -> tuple[Callable[[Floats], Floats], Callable[[Floats, Floats], Floats]]:
-        """Return Pinocchio's functions q -> M and (q, v) -> B + G, bound to the model, for timing."""
-        return (partial(self.pin.crba, self.model, self.data),
-                partial(self.pin.nonLinearEffects, self.model, self.data))  # fmt: skip
+        """Return Pinocchio's functions q -> M and (q, v) -> B + G, bound to the model, for
+        timing."""
+        return (
+            partial(self.pin.crba, self.model, self.data),
+            partial(self.pin.nonLinearEffects, self.model, self.data),
+        )
 
     def index(self, body: str) -> int:
         """Return the place of a body in the arrays of `bodies`."""
@@ -143,7 +169,8 @@ class PinocchioMechanism:
 
 
 def at_lever(jacobian: Floats, lever: Floats) -> Floats:
-    """Return J (3, d) of a point from the Jacobian (6, d) of its body and its distance (3,) from the body's origin."""
+    """Return J (3, d) of a point from the Jacobian (6, d) of its body and its distance (3,) from
+    the body's origin."""
     x, y, z = lever
     across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.asarray(jacobian[:3] - across @ jacobian[3:])
@@ -151,7 +178,8 @@ def at_lever(jacobian: Floats, lever: Floats) -> Floats:
 
 @numba.njit(cache=True, fastmath=False)
 def _rates(layout, q, v):  # type: ignore[no-untyped-def]
-    """Return dq/dt (nq,) from velocities in body axes: R v of a position, ½ r ⊗ ω of a quaternion r = (x, y, z, w)."""
+    """Return dq/dt (nq,) from velocities in body axes: R v of a position, ½ r ⊗ ω of a quaternion r
+    = (x, y, z, w)."""
     rate = np.empty(len(q))
     for j in range(len(layout) - 1):
         kind, a, b = layout[j]
@@ -180,12 +208,14 @@ def model_from_urdf(path: str | Path, floating_base: bool = False) -> PinocchioM
 def model_of(mechanism: Mechanism) -> PinocchioMechanism:
     """Build the same mechanism in Pinocchio.
 
-    A fixed body becomes a frame, and its inertia is added to its parent body. A planar joint becomes three joints.
+    A fixed body becomes a frame, and its inertia is added to its parent body. A planar joint
+    becomes three joints.
 
     Raises
     ------
     ArgumentError
-        The bodies are not in depth-first order, for which Pinocchio would silently give wrong results.
+        The bodies are not in depth-first order, for which Pinocchio would silently give wrong
+        results.
     """
     pinocchio, chain = _pinocchio(), list[str]()  # from a root to the newest body
     model, still = pinocchio.Model(), pinocchio.SE3.Identity()
@@ -199,7 +229,9 @@ def model_of(mechanism: Mechanism) -> PinocchioMechanism:
         joint, offset = anchors[body.parent]
         placement, before = offset * pinocchio.SE3(*body.placement), still
         kind, axis = body.joint.kind, body.joint.unit_axis
-        if kind == "continuous":  # Pinocchio's unbounded joint always rotates about z: turn z to the axis, and back
+        if (
+            kind == "continuous"
+        ):  # Pinocchio's unbounded joint always rotates about z: turn z to the axis, and back
             x = np.cross(np.eye(3)[np.argmin(np.abs(axis))], axis)
             x /= np.linalg.norm(x)
             before = pinocchio.SE3(np.column_stack((x, np.cross(axis, x), axis)), np.zeros(3))
@@ -216,8 +248,15 @@ def model_of(mechanism: Mechanism) -> PinocchioMechanism:
 
 
 # Pinocchio's joints that form each joint.
-_JOINTS = {"fixed": (), "planar": ("PX", "PY", "RZ"), "continuous": ("RUBZ",), "revolute": ("RevoluteUnaligned",),
-           "prismatic": ("PrismaticUnaligned",), "spherical": ("Spherical",), "free_flyer": ("FreeFlyer",)}  # fmt: skip
+_JOINTS = {
+    "fixed": (),
+    "planar": ("PX", "PY", "RZ"),
+    "continuous": ("RUBZ",),
+    "revolute": ("RevoluteUnaligned",),
+    "prismatic": ("PrismaticUnaligned",),
+    "spherical": ("Spherical",),
+    "free_flyer": ("FreeFlyer",),
+}
 
 
 def impulse_dynamics(
@@ -225,9 +264,9 @@ def impulse_dynamics(
 ) -> Floats:
     """Return v after an impact (d,) by Pinocchio's `impulseDynamics` for any mass matrix.
 
-    `impulseDynamics` takes a model, so the model here is a serial chain of d joints whose M is overwritten. It factors
-    M, forms the Delassus matrix J M^-1 J^T and factors that. So rows must be independent, and the error grows
-    with the square of the condition number of A = J L^-T.
+    `impulseDynamics` takes a model, so the model here is a serial chain of d joints whose M is
+    overwritten. It factors M, forms the Delassus matrix J M^-1 J^T and factors that. So rows must
+    be independent, and the error grows with the square of the condition number of A = J L^-T.
 
     Parameters
     ----------

@@ -2,30 +2,35 @@
 
 One step of length dt from velocity v, with generalized force f and contact rows J:
 
-    v_free = v + dt M⁻¹ f,   v⁺ = argmin ½|v⁺ − v_free|²_M  subject to  J v⁺ >= b,   p the multipliers,
+    v_free = v + dt M⁻¹ f,   v⁺ = argmin ½|v⁺ − v_free|²_M  subject to  J v⁺ >= b,   p the
+    multipliers,
 
-    b_i = −gap_i/dt         open contact (gap > 0) that may close but not penetrate (Stewart-Trinkle, Anitescu)
-    b_i = −inf              open contact without constraint (Moreau): it acts only after it closes
-    b_i = −e gamma_minus_i  closed contact that approaches (Newton); 0 in Poisson's step
-    b_i = 0                 closed contact that does not approach; with `stabilization`, a share of −gap_i/dt if gap < 0
+    b_i = −gap_i/dt         open contact (gap > 0) that may close but not penetrate
+    (Stewart-Trinkle, Anitescu) b_i = −inf              open contact without constraint (Moreau): it
+    acts only after it closes b_i = −e gamma_minus_i  closed contact that approaches (Newton); 0 in
+    Poisson's step b_i = 0                 closed contact that does not approach; with
+    `stabilization`, a share of −gap_i/dt if gap < 0
 
-Poisson's step adds the impulses e p at the contacts that approached, and solves once more with the same b. It has a
-solution also if Newton's law has none (opposed closed contacts with e > 0). Each contact may have its own e_i.
+Poisson's step adds the impulses e p at the contacts that approached, and solves once more with the
+same b. It has a solution also if Newton's law has none (opposed closed contacts with e > 0). Each
+contact may have its own e_i.
 
-Newton's step can gain energy, even with equal e_i: approaching rows get J v⁺ = −e J v⁻, but separating rows get
-J v⁺ >= 0, which amounts to a different e. Example: a bar of 1 kg on two closed contacts with e = 1, one end falling at
-1 m/s and the other rising at 0.1 m/s. Then p = (0.65, 0.3) N s, and the impulse on the other end, which comes to rest,
-adds 0.015 J. The contacts do the work ½ pᵀ(J v + J v⁺), or ½ pᵀ(J v_free + J v⁺) after the forces. If e > 0 and
-both are positive, Poisson's step is used, which never gains energy.
-Source: Moreau, in Nonsmooth Mechanics and Applications (1988); Stewart and Trinkle, Int. J. Numer. Methods Eng. 39
-(1996); Anitescu and Potra, Nonlinear Dynamics 14 (1997).
+Newton's step can gain energy, even with equal e_i: approaching rows get J v⁺ = −e J v⁻, but
+separating rows get J v⁺ >= 0, which amounts to a different e. Example: a bar of 1 kg on two closed
+contacts with e = 1, one end falling at 1 m/s and the other rising at 0.1 m/s. Then p = (0.65, 0.3)
+N s, and the impulse on the other end, which comes to rest, adds 0.015 J. The contacts do the work ½
+pᵀ(J v + J v⁺), or ½ pᵀ(J v_free + J v⁺) after the forces. If e > 0 and both are positive, Poisson's
+step is used, which never gains energy. Source: Moreau, in Nonsmooth Mechanics and Applications
+(1988); Stewart and Trinkle, Int. J. Numer. Methods Eng. 39 (1996); Anitescu and Potra, Nonlinear
+Dynamics 14 (1997).
 
-With dry friction (`friction_step`) the step's contacts are blocks (normal, one tangent in the plane or two in space):
-K ∋ p ⟂ w + mu |w_T| n ∈ K*, where w is J v⁺ − b on the normals and the tangential velocity after the step; `relaxed`
-drops mu |w_T| (Anitescu). The problem is first solved for the closing contacts alone. Contacts that close under this
-solution are then added, and it is solved again; the last solution solves the whole problem. Contacts without a common
-body (zero blocks of W) form separate problems, the islands.
-Source: Stewart and Trinkle (1996); Anitescu and Tasora, Comput. Optim. Appl. 47 (2010).
+With dry friction (`friction_step`) the step's contacts are blocks (normal, one tangent in the plane
+or two in space): K ∋ p ⟂ w + mu |w_T| n ∈ K*, where w is J v⁺ − b on the normals and the tangential
+velocity after the step; `relaxed` drops mu |w_T| (Anitescu). The problem is first solved for the
+closing contacts alone. Contacts that close under this solution are then added, and it is solved
+again; the last solution solves the whole problem. Contacts without a common body (zero blocks of W)
+form separate problems, the islands. Source: Stewart and Trinkle (1996); Anitescu and Tasora,
+Comput. Optim. Appl. 47 (2010).
 """
 
 from __future__ import annotations
@@ -44,10 +49,11 @@ from reference.complementarity.solvers import solve
 from reference.complementarity.solvers.qp import daqp, quadprog
 from reference.complementarity.solvers.sweeps import projected_sweeps
 
-# Active-set solutions have errors of a few hundred roundings of the velocities; a larger error means a wrong set.
+# Active-set solutions have errors of a few hundred roundings of the velocities; a larger error
+# means a wrong set.
 STEP_TOLERANCE = 1e-10
-# Velocities that cancel leave rounding errors even with the right active set: a box of 1 g under a tonne gets 250 m/s
-# from above and as much from below. Each is a sum of some dozens of products.
+# Velocities that cancel leave rounding errors even with the right active set: a box of 1 g under a
+# tonne gets 250 m/s from above and as much from below. Each is a sum of some dozens of products.
 STEP_ROUNDING = 100.0 * float(np.finfo(np.float64).eps)
 
 # Active sets cycle for some redundant rows, projections do not.
@@ -56,9 +62,10 @@ SCHEMES = ("automatic", "moreau", "stewart-trinkle")
 NEWTON, POISSON = "Newton", "Poisson"
 
 FRICTION_LAWS = ("none", "coulomb", "relaxed")
-# Gauss-Seidel reaches 1e-13 of the velocities if it converges; such a solution is accepted at once. On hyperstatic
-# contacts it converges slowly, and an interior point stops at the square root of its accuracy. Then the best solution
-# is accepted if it reaches the tolerance of `reference.complementarity`.
+# Gauss-Seidel reaches 1e-13 of the velocities if it converges; such a solution is accepted at once.
+# On hyperstatic contacts it converges slowly, and an interior point stops at the square root of its
+# accuracy. Then the best solution is accepted if it reaches the tolerance of
+# `reference.complementarity`.
 CONVERGED, FRICTION_TOLERANCE = 1e-8, SOLVED_TOLERANCE
 FRICTION_SOLVERS = ("nsgs", "pinocchio_admm", "cvxpy_socp")
 
@@ -67,14 +74,24 @@ class RigidStep(NamedTuple):
     """Result of one rigid step."""
 
     velocity: Floats  #: (d,) v⁺
-    impulse: Floats  #: (c,) p >= 0 [N s], zero for contacts left out; not unique for redundant contacts
+    impulse: (
+        Floats  #: (c,) p >= 0 [N s], zero for contacts left out; not unique for redundant contacts
+    )
     residual: float  #: recomputed natural-map residual of the step's LCP, relative to the velocities involved
     restitution_law: str = NEWTON  #: "Newton" or "Poisson", the law that the step used
 
 
 def rigid_step(
-    mass_matrix: Floats, velocity: Floats, force: Floats, dt: float, contact_jacobian: Floats, gap: Floats,
-    gamma_minus: Floats, restitution: float | Floats, stabilization: float = 0.0, scheme: str = "automatic",
+    mass_matrix: Floats,
+    velocity: Floats,
+    force: Floats,
+    dt: float,
+    contact_jacobian: Floats,
+    gap: Floats,
+    gamma_minus: Floats,
+    restitution: float | Floats,
+    stabilization: float = 0.0,
+    scheme: str = "automatic",
 ) -> RigidStep:
     """Advance v (d,) by dt [s] under generalized force f (d,) and unilateral contacts.
 
@@ -82,17 +99,20 @@ def rigid_step(
     ----------
     contact_jacobian : (c, d) unit-normal rows; gap : (c,) [m]; gamma_minus : (c,) J v [m/s]
     restitution : e in [0, 1], one for all contacts or (c,)
-    stabilization : share in [0, 1] of an overlap that this step removes (0: none, as in Moreau's step)
-    scheme : "moreau" ignores open contacts; "stewart-trinkle" keeps them from penetrating, with Poisson's law if
-        e > 0; "automatic" treats an open contact as Stewart-Trinkle's step if its e = 0 and as Moreau's if e > 0
+    stabilization : share in [0, 1] of an overlap that this step removes (0: none, as in Moreau's
+        step)
+    scheme : "moreau" ignores open contacts; "stewart-trinkle" keeps them from penetrating, with
+        Poisson's law if e > 0; "automatic" treats an open contact as Stewart-Trinkle's step if its
+        e = 0 and as Moreau's if e > 0
 
-    If Newton's law has no solution (opposed closed contacts with e > 0) or would gain energy, the step uses Poisson's
-    law, and `restitution_law` says so.
+    If Newton's law has no solution (opposed closed contacts with e > 0) or would gain energy, the
+    step uses Poisson's law, and `restitution_law` says so.
 
     Raises
     ------
     SolverError
-        No solver reaches a residual of STEP_TOLERANCE; the message gives the number of contacts and each solver's text.
+        No solver reaches a residual of STEP_TOLERANCE; the message gives the number of contacts and
+        each solver's text.
     """
     bounces = bool(np.any(restitution))
     bound = velocity_bounds(gap, gamma_minus, restitution, dt, stabilization, scheme)
@@ -107,7 +127,9 @@ def rigid_step(
         except SolverError:
             if not bounces or np.count_nonzero(gap <= 0.0) < 2:
                 raise
-    compression = velocity_bounds(gap, gamma_minus, 0.0, dt, stabilization if poisson else 0.0, scheme)
+    compression = velocity_bounds(
+        gap, gamma_minus, 0.0, dt, stabilization if poisson else 0.0, scheme
+    )
     compression = np.where(np.isfinite(bound), compression, -np.inf)
     compressed = nearest_velocity(mass_matrix, v_free, contact_jacobian, compression)
     returned = np.where(gamma_minus < 0.0, restitution, 0.0) * compressed.impulse
@@ -118,7 +140,8 @@ def rigid_step(
 
 
 def _gains(step: RigidStep, contact_jacobian: Floats, gamma_minus: Floats, v_free: Floats) -> bool:
-    """Whether the works of the contacts, ½ pᵀ(γ⁻ + γ⁺) and ½ pᵀ(γ_free + γ⁺), are both positive beyond rounding."""
+    """Whether the works of the contacts, ½ pᵀ(γ⁻ + γ⁺) and ½ pᵀ(γ_free + γ⁺), are both positive
+    beyond rounding."""
     gamma_plus, gamma_free = contact_jacobian @ step.velocity, contact_jacobian @ v_free
     # includes γ_free, the effect of the load: at rest, γ⁻ is rounding error of either sign
     size = float(step.impulse @ (np.abs(gamma_minus) + np.abs(gamma_free) + np.abs(gamma_plus)))
@@ -126,10 +149,14 @@ def _gains(step: RigidStep, contact_jacobian: Floats, gamma_minus: Floats, v_fre
     return work > STEP_TOLERANCE * size
 
 
-def nearest_velocity(mass_matrix: Floats, v_free: Floats, contact_jacobian: Floats, bound: Floats) -> RigidStep:
-    """Return the velocity nearest to v_free in the kinetic metric with J v >= bound; −inf ignores a row.
+def nearest_velocity(
+    mass_matrix: Floats, v_free: Floats, contact_jacobian: Floats, bound: Floats
+) -> RigidStep:
+    """Return the velocity nearest to v_free in the kinetic metric with J v >= bound; −inf ignores a
+    row.
 
-    The impulse is that of the first solver whose recomputed residual is at most STEP_TOLERANCE or rounding.
+    The impulse is that of the first solver whose recomputed residual is at most STEP_TOLERANCE or
+    rounding.
     """
     impulse, kept = np.zeros(len(bound)), np.isfinite(bound)
     offset = contact_jacobian[kept] @ v_free - bound[kept]
@@ -146,7 +173,8 @@ def nearest_velocity(mass_matrix: Floats, v_free: Floats, contact_jacobian: Floa
         except SolverError as error:
             said.append(str(error))
             continue
-        # the largest |min(W_ii p_i, w_i)| [m/s] of 0 <= p ⟂ w = A Aᵀ p + offset >= 0, and the terms that cancel in w
+        # the largest |min(W_ii p_i, w_i)| [m/s] of 0 <= p ⟂ w = A Aᵀ p + offset >= 0, and the terms
+        # that cancel in w
         natural = np.minimum(np.einsum("ij,ij->i", rows, rows) * p, rows @ (rows.T @ p) + offset)
         residual, sizes = float(np.abs(natural).max(initial=0.0)) / scale, np.abs(rows)
         cancelling = float((sizes @ (sizes.T @ np.abs(p))).max(initial=0.0))
@@ -154,7 +182,9 @@ def nearest_velocity(mass_matrix: Floats, v_free: Floats, contact_jacobian: Floa
             impulse[kept] = p
             return RigidStep(v_free + _back(factor, rows.T @ p), impulse, residual)
         said.append(f"{name}: residual {residual:.1e}")
-    raise SolverError(f"rigid step with {len(offset)} contacts has no accepted solution: " + "; ".join(said))
+    raise SolverError(
+        f"rigid step with {len(offset)} contacts has no accepted solution: " + "; ".join(said)
+    )
 
 
 def solve_mass(mass_matrix: Floats, right: Floats) -> Floats:
@@ -165,7 +195,8 @@ def solve_mass(mass_matrix: Floats, right: Floats) -> Floats:
 
 @numba.njit(cache=True, fastmath=False)
 def _cholesky(mass):  # type: ignore[no-untyped-def]
-    """Return the lower L of M = L Lᵀ; for such small matrices, numpy's call overhead would dominate."""
+    """Return the lower L of M = L Lᵀ; for such small matrices, numpy's call overhead would
+    dominate."""
     factor = np.zeros_like(mass)
     for j in range(len(mass)):
         for i in range(j, len(mass)):
@@ -207,13 +238,20 @@ def _back(factor, right):  # type: ignore[no-untyped-def]
 
 
 def velocity_bounds(
-    gap: Floats, gamma_minus: Floats, restitution: float | Floats, dt: float, stabilization: float = 0.0,
+    gap: Floats,
+    gamma_minus: Floats,
+    restitution: float | Floats,
+    dt: float,
+    stabilization: float = 0.0,
     scheme: str = "automatic",
 ) -> Floats:
-    """Return b (c,) of J v⁺ >= b [m/s], for one e or e (c,); −inf marks contacts that the step ignores."""
+    """Return b (c,) of J v⁺ >= b [m/s], for one e or e (c,); −inf marks contacts that the step
+    ignores."""
     e = np.asarray(restitution, np.float64)
     if not ((e >= 0.0) & (e <= 1.0)).all() or e.shape not in ((), gap.shape):
-        raise ArgumentError("restitution", restitution, "values in [0, 1], one for all or one for each contact")
+        raise ArgumentError(
+            "restitution", restitution, "values in [0, 1], one for all or one for each contact"
+        )
     if not 0.0 <= stabilization <= 1.0:
         raise ArgumentError("stabilization", stabilization, "a value in [0, 1]")
     if scheme not in SCHEMES:
@@ -227,21 +265,28 @@ def velocity_bounds(
 
 
 def friction_step(
-    mass_matrix: Floats, v_free: Floats, normal_rows: Floats, tangent_rows: Floats, bound: Floats,
-    friction: float | Floats, relaxed: bool = False,
+    mass_matrix: Floats,
+    v_free: Floats,
+    normal_rows: Floats,
+    tangent_rows: Floats,
+    bound: Floats,
+    friction: float | Floats,
+    relaxed: bool = False,
 ) -> tuple[Floats, Floats, Floats]:
     """Return v⁺ (d,), normal (c,) and tangential impulses (c, s) [N s] of one step.
 
     Parameters
     ----------
-    normal_rows : (c, d) unit-normal rows; tangent_rows : (c, s, d) rows of s = 1 (plane) or 2 (space) unit tangents
+    normal_rows : (c, d) unit-normal rows; tangent_rows : (c, s, d) rows of s = 1 (plane) or 2
+        (space) unit tangents
     bound : (c,) lower bounds of the normal velocities after the step [m/s]; −inf ignores a contact
     friction : mu >= 0, one for all contacts or (c,)
 
     Raises
     ------
     SolverError
-        No solver reaches FRICTION_TOLERANCE; the message gives the number of contacts and each solver's text.
+        No solver reaches FRICTION_TOLERANCE; the message gives the number of contacts and each
+        solver's text.
     """
     blocks = np.concatenate([normal_rows[:, None], tangent_rows], axis=1)
     count, size = blocks.shape[:2]
@@ -259,22 +304,36 @@ def friction_step(
 
 
 def _by_islands(w: Floats, offset: Floats, friction: Floats, relaxed: bool) -> Floats:
-    """Return p (k, size) for offset (k, size) [m/s]: of each island, the first that converges, or the best."""
+    """Return p (k, size) for offset (k, size) [m/s]: of each island, the first that converges, or
+    the best."""
     from scipy.sparse.csgraph import connected_components
 
     count, size = offset.shape
     blocks, impulse = w.reshape(count, size, count, size), np.zeros_like(offset)
     islands, island = connected_components((blocks != 0.0).any(axis=(1, 3)), directed=False)
     for mine in (np.flatnonzero(island == k) for k in range(islands)):
-        problem = ImpactProblem.from_delassus(blocks[mine][:, :, mine].reshape(len(mine) * size, -1),
-                                              offset[mine].ravel(), 0.0, friction[mine], contact_size=size,
-                                              relaxed=relaxed)  # fmt: skip
+        problem = ImpactProblem.from_delassus(
+            blocks[mine][:, :, mine].reshape(len(mine) * size, -1),
+            offset[mine].ravel(),
+            0.0,
+            friction[mine],
+            contact_size=size,
+            relaxed=relaxed,
+        )
         found: list[Solution] = []
         while len(found) < len(FRICTION_SOLVERS) and not (found and found[-1].solved(CONVERGED)):
             found.append(solve(problem, FRICTION_SOLVERS[len(found)]))
-        best = found[-1] if found[-1].solved(CONVERGED) else min(found, key=lambda one: one.residuals.worst)
+        best = (
+            found[-1]
+            if found[-1].solved(CONVERGED)
+            else min(found, key=lambda one: one.residuals.worst)
+        )
         if not best.solved(FRICTION_TOLERANCE):
-            said = "; ".join(f"{x.solver}: residual {x.residuals.worst:.1e}, {x.note}" for x in found)
-            raise SolverError(f"rigid step with friction and {len(mine)} contacts has no accepted solution: {said}")
+            said = "; ".join(
+                f"{x.solver}: residual {x.residuals.worst:.1e}, {x.note}" for x in found
+            )
+            raise SolverError(
+                f"rigid step with friction and {len(mine)} contacts has no accepted solution: {said}"
+            )
         impulse[mine] = best.answer().reshape(-1, size)
     return impulse

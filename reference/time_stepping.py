@@ -1,8 +1,9 @@
-"""The contact law of the "ideal" world and of CBuc: rigid contacts at velocity level, one QP per step.
+"""The contact law of the "ideal" world and of CBuc: rigid contacts at velocity level, one QP per
+step.
 
-Forces and impulses act at the start of the step, at its configuration, by `reference.rigid_step` (Moreau/Jean,
-Stewart-Trinkle/Anitescu, Poisson; dry friction). Then the mechanism moves on its own, by `reference.free_motion`. This
-module makes both a contact law that runs on every scene.
+Forces and impulses act at the start of the step, at its configuration, by `reference.rigid_step`
+(Moreau/Jean, Stewart-Trinkle/Anitescu, Poisson; dry friction). Then the mechanism moves on its own,
+by `reference.free_motion`. This module makes both a contact law that runs on every scene.
 """
 
 from __future__ import annotations
@@ -24,9 +25,11 @@ from reference.free_motion import free_motion
 from reference.one_thread import one_thread
 from reference.rigid_step import FRICTION_LAWS, SCHEMES, friction_step, rigid_step, velocity_bounds
 
-# Entries of J in one step, which then takes 4 GB and about 15 s. 320 circles on a floor reach this limit.
+# Entries of J in one step, which then takes 4 GB and about 15 s. 320 circles on a floor reach this
+# limit.
 MOST_ENTRIES = 50_000_000
-# Measured on AMD EPYC (Zen 4) with 5 to 100 circles and boxes on a floor: 0.13 to 0.9 µs per entry from 50 on.
+# Measured on AMD EPYC (Zen 4) with 5 to 100 circles and boxes on a floor: 0.13 to 0.9 µs per entry
+# from 50 on.
 SECONDS_A_STEP, SECONDS_AN_ENTRY = 1e-3, 3e-7
 
 
@@ -41,20 +44,22 @@ class _Solved(NamedTuple):
 
 @dataclass(frozen=True)
 class RigidConstraints:
-    """The law of the rigid worlds: non-penetration is a constraint on the velocity at the end of each step.
+    """The law of the rigid worlds: non-penetration is a constraint on the velocity at the end of
+    each step.
 
     Parameters
     ----------
-    margin : the step considers contacts with gap <= margin [m]; infinity includes every candidate pair, and a
-        finite margin must exceed the largest speed times the step
+    margin : the step considers contacts with gap <= margin [m]; infinity includes every candidate
+        pair, and a finite margin must exceed the largest speed times the step
     stabilization : share of an overlap that each step removes, 0 for none
     scheme : "moreau", "stewart-trinkle" or "automatic" (see `reference.rigid_step`)
-    friction : "none" (the paper's rigid worlds), "coulomb" or "relaxed", with the scene's coefficient
+    friction : "none" (the paper's rigid worlds), "coulomb" or "relaxed", with the scene's
+        coefficient
 
-    Restitution follows Newton's law with the scene's value for each pair. Poisson's law is used in "stewart-trinkle"
-    with e > 0, and in frictionless steps for which Newton's law has no solution or would gain energy. This can happen
-    with one e for all contacts, too (see the example in `reference.rigid_step`). With friction, Newton's law may gain
-    energy.
+    Restitution follows Newton's law with the scene's value for each pair. Poisson's law is used in
+    "stewart-trinkle" with e > 0, and in frictionless steps for which Newton's law has no solution
+    or would gain energy. This can happen with one e for all contacts, too (see the example in
+    `reference.rigid_step`). With friction, Newton's law may gain energy.
     """
 
     margin: float = np.inf
@@ -64,28 +69,40 @@ class RigidConstraints:
     name = "rigid constraints"
 
     def __post_init__(self) -> None:
-        for argument, value, known in (("scheme", self.scheme, SCHEMES), ("friction", self.friction, FRICTION_LAWS)):
+        for argument, value, known in (
+            ("scheme", self.scheme, SCHEMES),
+            ("friction", self.friction, FRICTION_LAWS),
+        ):
             if value not in known:
                 raise ArgumentError(argument, value, one_of(value, known))
 
     @property
     def uses(self) -> frozenset[str]:
-        """Parts of the scene that the law uses: restitution, joints, and friction unless `friction` is "none"."""
+        """Parts of the scene that the law uses: restitution, joints, and friction unless `friction`
+        is "none"."""
         friction = () if self.friction == "none" else (FRICTION, IMPACT_FRICTION)
         return frozenset((OWN_RESTITUTION, JOINTS, *friction))
 
     @property
     def settings(self) -> dict[str, Any]:
-        """All parameters of a step besides the scene, which gives the coefficients of restitution and friction."""
-        return {**asdict(self), "restitution where Newton's law has no solution or gains energy": "Poisson"}
+        """All parameters of a step besides the scene, which gives the coefficients of restitution
+        and friction."""
+        return {
+            **asdict(self),
+            "restitution where Newton's law has no solution or gains energy": "Poisson",
+        }
 
     def cost(self, system: Any) -> Cost:
-        """Estimate the cost of a step from the scene alone, with the contacts of every pair of shapes, near or far.
+        """Estimate the cost of a step from the scene alone, with the contacts of every pair of
+        shapes, near or far.
 
-        A circle or ball has one contact with anything, two boxes in the plane up to two, and in space up to eight.
+        A circle or ball has one contact with anything, two boxes in the plane up to two, and in
+        space up to eight.
         """
         kind, d = system.shapes.kind, system.mechanism.nv
-        points = np.where(np.isin(kind, (BOX, *ENDLESS)), BOX_CORNERS, np.where(kind == POLYGON, 2, 1))
+        points = np.where(
+            np.isin(kind, (BOX, *ENDLESS)), BOX_CORNERS, np.where(kind == POLYGON, 2, 1)
+        )
         contacts = int(points[system.pairs].min(axis=1).sum()) + len(system.stops.bound)
         return Cost(contacts, d, SECONDS_A_STEP + SECONDS_AN_ENTRY * contacts * d)
 
@@ -93,21 +110,32 @@ class RigidConstraints:
     def advance(self, system: Any, state: Any, applied_force: Floats, dt: float) -> StepResult:
         """Do one step (see `iapb.contact.laws.ContactLaw`).
 
-        Impulses are reported as collision impulses at contacts that approached faster than the scene's approach
-        velocity, and at pushing contacts connected to them through bodies. The others are reported as forces p/dt. The
-        step only determines the sum of both. Collision impulses include the loads of the step; with e near 1 their work
-        may exceed the energy loss. With joint damping, a step with a collision has two parts: the collision, then
-        forces and damping.
+        Impulses are reported as collision impulses at contacts that approached faster than the
+        scene's approach velocity, and at pushing contacts connected to them through bodies. The
+        others are reported as forces p/dt. The step only determines the sum of both. Collision
+        impulses include the loads of the step; with e near 1 their work may exceed the energy loss.
+        With joint damping, a step with a collision has two parts: the collision, then forces and
+        damping.
         """
         entries = len(system.pairs) * system.mechanism.nv
         if entries > MOST_ENTRIES // BOX_CORNERS and (cost := self.cost(system)).too_large:
-            raise ArgumentError("scene", system.scene.name, f"at most {MOST_ENTRIES:,} numbers in the rows of a rigid "
-                                f"step; {cost.contacts:,} contacts of {cost.coordinates:,} coordinates have "
-                                f"{cost.contacts * cost.coordinates:,}. Fewer bodies, or the world IAPB")
-        mechanics, q, v, g = contact_rows.mechanics_of(system), state.q.copy(), state.v.copy(), system.gravity
+            raise ArgumentError(
+                "scene",
+                system.scene.name,
+                f"at most {MOST_ENTRIES:,} numbers in the rows of a rigid "
+                f"step; {cost.contacts:,} contacts of {cost.coordinates:,} coordinates have "
+                f"{cost.contacts * cost.coordinates:,}. Fewer bodies, or the world IAPB",
+            )
+        mechanics, q, v, g = (
+            contact_rows.mechanics_of(system),
+            state.q.copy(),
+            state.v.copy(),
+            system.gravity,
+        )
         mass = mechanics.mass_matrix(q)
         found = contact_rows.find_rows(system, q, v, self.margin)
-        # B belongs to the free motion after the forces; where it is zero, its rounding errors keep their old place.
+        # B belongs to the free motion after the forces; where it is zero, its rounding errors keep
+        # their old place.
         inner = mechanics.gravity(q, g) if mechanics.has_bias else mechanics.inner_forces(q, v, g)
         force = applied_force - inner
         # Joint damping is implicit, by M + Δt D, as in the engine's step.
@@ -117,45 +145,86 @@ class RigidConstraints:
         blows = _blows(mass, found, step.normal, approach)
         lasts = ~blows
         if damping.any() and blows.any():
-            # The collision comes first, with M alone: an impulse p solved with damping could gain energy on M.
+            # The collision comes first, with M alone: an impulse p solved with damping could gain
+            # energy on M.
             struck = self._solve(system, mass, q, v, np.zeros_like(v), dt, found)
-            blows, lasts = _blows(mass, found, struck.normal, approach), np.ones(len(blows), np.bool_)
+            blows, lasts = (
+                _blows(mass, found, struck.normal, approach),
+                np.ones(len(blows), np.bool_),
+            )
             blow = (found.jacobian.T * struck.normal + struck.dragging)[:, blows].sum(axis=1)
             thrown = v + np.linalg.solve(mass, blow)
             moved = replace(found, gamma=found.jacobian @ thrown)
             step = self._solve(system, damped, q, thrown, force - damping * thrown, dt, moved)
         impulse = (found.jacobian.T * struck.normal + struck.dragging)[:, blows].sum(axis=1)
-        pressing, dragging = (part[:, lasts].sum(axis=1) / dt
-                              for part in (found.jacobian.T * step.normal, step.dragging))  # fmt: skip
+        pressing, dragging = (
+            part[:, lasts].sum(axis=1) / dt
+            for part in (found.jacobian.T * step.normal, step.dragging)
+        )
         blow, pushed = np.where(blows, struck.normal, 0.0), np.where(lasts, step.normal, 0.0)
-        contact_rows.write_contacts(state, found, blow, pushed, np.where(lasts[:, None], step.tangential, 0.0), dt)
+        contact_rows.write_contacts(
+            state, found, blow, pushed, np.where(lasts[:, None], step.tangential, 0.0), dt
+        )
         contact_rows.write_impact(state, system, v, mass, impulse, found.jacobian[blows])
         q_plus, v_plus = free_motion(mechanics, q, step.velocity, dt)
         touches = ((found.gap <= 0.0) | (step.normal > 0.0)).any()
         contact_state = COLLIDING if blows.any() else RESTING if touches else FREE
-        return StepResult(q_plus, v_plus, pressing, dragging - damping * step.velocity, impulse, contact_state)
+        return StepResult(
+            q_plus, v_plus, pressing, dragging - damping * step.velocity, impulse, contact_state
+        )
 
-    def _solve(self, system: Any, mass: Floats, q: Floats, v: Floats, force: Floats, dt: float,
-               found: contact_rows.ContactRows) -> _Solved:  # fmt: skip
+    def _solve(
+        self,
+        system: Any,
+        mass: Floats,
+        q: Floats,
+        v: Floats,
+        force: Floats,
+        dt: float,
+        found: contact_rows.ContactRows,
+    ) -> _Solved:
         (classes, table), values, shapes = system.frictions, system.restitutions, found.geometry[:2]
-        e: float | Floats = float(values[0]) if len(values) else float(system.scene.contact.restitution)
+        e: float | Floats = (
+            float(values[0]) if len(values) else float(system.scene.contact.restitution)
+        )
         if len(values) > 1:  # pairs that can touch differ: one e for each contact
             e = restitution_by_pair(system.scene, np.stack(shapes, axis=1))
         if self.friction == "none" or not table.any():
-            step = rigid_step(mass, v, force, dt, found.jacobian, found.gap, found.gamma, e, self.stabilization,
-                              self.scheme)  # fmt: skip
-            return _Solved(step.velocity, step.impulse, np.zeros((len(found.gap), 3)), np.zeros_like(found.jacobian.T))
+            step = rigid_step(
+                mass,
+                v,
+                force,
+                dt,
+                found.jacobian,
+                found.gap,
+                found.gamma,
+                e,
+                self.stabilization,
+                self.scheme,
+            )
+            return _Solved(
+                step.velocity,
+                step.impulse,
+                np.zeros((len(found.gap), 3)),
+                np.zeros_like(found.jacobian.T),
+            )
         mu = table[classes[shapes[0]], classes[shapes[1]]]
         bound = velocity_bounds(found.gap, found.gamma, e, dt, self.stabilization, self.scheme)
         tangents, rows = contact_rows.tangent_rows(system, q, found)
         v_free, relaxed = v + dt * np.linalg.solve(mass, force), self.friction == "relaxed"
-        velocity, normal, slip = friction_step(mass, v_free, found.jacobian, rows, bound, mu, relaxed)
-        along, dragging = np.einsum("csx,cs->cx", tangents, slip), np.einsum("csd,cs->dc", rows, slip)
+        velocity, normal, slip = friction_step(
+            mass, v_free, found.jacobian, rows, bound, mu, relaxed
+        )
+        along, dragging = (
+            np.einsum("csx,cs->cx", tangents, slip),
+            np.einsum("csd,cs->dc", rows, slip),
+        )
         return _Solved(velocity, normal, along, dragging)
 
 
 class Cost(NamedTuple):
-    """Cost of a step of the rigid worlds: number of contacts, of coordinates, and estimated seconds."""
+    """Cost of a step of the rigid worlds: number of contacts, of coordinates, and estimated
+    seconds."""
 
     contacts: int
     coordinates: int
@@ -167,11 +236,15 @@ class Cost(NamedTuple):
         return self.contacts * self.coordinates > MOST_ENTRIES
 
 
-def _blows(mass: Floats, found: contact_rows.ContactRows, impulse: Floats, approach: float) -> NDArray[np.bool_]:
-    """Return the contacts (c,) of the collision: approaching ones, and pushing ones connected to them (W_ij ≠ 0)."""
+def _blows(
+    mass: Floats, found: contact_rows.ContactRows, impulse: Floats, approach: float
+) -> NDArray[np.bool_]:
+    """Return the contacts (c,) of the collision: approaching ones, and pushing ones connected to
+    them (W_ij ≠ 0)."""
     from scipy.sparse.csgraph import connected_components
 
-    # Without connected contacts, inner ones of a cradle would act by forces, and the impact alone could gain energy.
+    # Without connected contacts, inner ones of a cradle would act by forces, and the impact alone
+    # could gain energy.
     pushes = impulse > 0.0
     struck = pushes & (found.gamma < -approach)
     if not struck.any() or np.array_equal(struck, pushes):

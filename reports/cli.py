@@ -19,8 +19,8 @@ import typer
 
 from iapb.errors import ArgumentError, IapbError, RunFileError, harmless, name_the_extra
 
-# command -> its line in `iapb --help`. The module of that name in reports.commands has a function with the same name.
-# Only the module of the given command is imported; `iapb --help` imports none.
+# command -> its line in `iapb --help`. The module of that name in reports.commands has a function
+# with the same name. Only the module of the given command is imported; `iapb --help` imports none.
 COMMANDS = {
     "run": "Simulate SCENE and store the run as HDF5. An existing run is reused.",
     "check": "Warn of problems that would make a run of SCENE worthless, with values to set; end with 3 then.",
@@ -32,14 +32,14 @@ COMMANDS = {
     "schema": "Print the JSON Schema of scene files (for completion and checks in an editor).",
     "prove": "Check every machine-checked statement, or print the proof of one.",
     "verify": "Test an impact resolver against every law; print the verdict, the worst case and a shrunk "
-              "counterexample.",
+    "counterexample.",
     "compare": "Compare worlds on SCENE; without SCENE, IAPB with complementarity, and solvers on problem files.",
     "bench": "Time a step, an impact and a motion; compare with MuJoCo, Pinocchio, solvers and the printed formula.",
     "sweep": "Simulate every point of STUDY that has no run file yet, and write a table of all points.",
     "store": "Check the run and table files below a folder, or simulate its runs again.",
     "reproduce": "Regenerate the report; cached results are reused.",
     "report": "Compare the numbers of two reports: equal, within a tolerance, or different; end with 1 if some differ.",
-}  # fmt: skip
+}
 
 GROUPS = {  # of the help, in its order
     "Simulate": ("run", "check", "scenes", "schema", "effects", "view", "sweep"),
@@ -48,7 +48,8 @@ GROUPS = {  # of the help, in its order
     "The paper": ("reproduce", "report"),
 }
 
-# Many scenes share kernels compiled whole (see `iapb.compiled`); other commands compile what one scene needs.
+# Many scenes share kernels compiled whole (see `iapb.compiled`); other commands compile what one
+# scene needs.
 MANY_SCENES = ("verify", "bench", "sweep", "store", "reproduce")
 
 COMPLETION = "_IAPB_COMPLETE"  # set while a shell asks for completions
@@ -63,7 +64,9 @@ def _version(asked: bool) -> None:
 
 def _before(
     debug: bool = typer.Option(False, "--debug", help="Show the traceback of an error."),
-    version_: bool = typer.Option(False, "--version", help="Print the version.", callback=_version, is_eager=True),
+    version_: bool = typer.Option(
+        False, "--version", help="Print the version.", callback=_version, is_eager=True
+    ),
 ) -> None:
     """Take the options before the command; `main` looks for --debug itself."""
 
@@ -71,11 +74,13 @@ def _before(
 def _app(given: list[str]) -> typer.Typer:
     """Return the command line with all commands; only the given command can be called."""
     app = typer.Typer(
-        name="iapb", no_args_is_help=True, pretty_exceptions_enable=False,
+        name="iapb",
+        no_args_is_help=True,
+        pretty_exceptions_enable=False,
         help="Rigid contact by impulses where a contact is new and penalties while it lasts: simulate scenes, prove "
-             "and test passivity, compare with complementarity, regenerate the paper's figures.",
+        "and test passivity, compare with complementarity, regenerate the paper's figures.",
         epilog="Start with: iapb run peg_corner",
-    )  # fmt: skip
+    )
     app.callback()(_before)
     if COMPLETION in os.environ:  # shell completion: the shell passes the words in a variable
         given = os.environ.get("COMP_WORDS", os.environ.get("_TYPER_COMPLETE_ARGS", "")).split()[1:]
@@ -88,12 +93,15 @@ def _app(given: list[str]) -> typer.Typer:
             command = getattr(import_module(f"reports.commands.{name}"), name)
             app.command(name, rich_help_panel=group)(_answering(command))
         else:
-            app.command(name, help=words, rich_help_panel=group)(lambda: None)  # only listed in the help
+            app.command(name, help=words, rich_help_panel=group)(
+                lambda: None
+            )  # only listed in the help
     return app
 
 
 def _answering(command: Callable[..., Any]) -> Callable[..., int]:
-    """Print the answer of a command and return its status; Ctrl-C becomes typer.Abort, which reaches `main`."""
+    """Print the answer of a command and return its status; Ctrl-C becomes typer.Abort, which
+    reaches `main`."""
 
     @wraps(command)
     def call(*arguments: Any, **options: Any) -> int:
@@ -101,7 +109,9 @@ def _answering(command: Callable[..., Any]) -> Callable[..., int]:
             answer = command(*arguments, **options)
         except KeyboardInterrupt:
             raise typer.Abort from None
-        print(harmless(answer.text(options.get("json_", False))), flush=True)  # colours of files do not pass, too
+        print(
+            harmless(answer.text(options.get("json_", False))), flush=True
+        )  # colours of files do not pass, too
         return int(answer.status)
 
     return call
@@ -112,12 +122,14 @@ _BARS = re.compile(r"(\x1b\[(?:[0-9;]*m|[0-9]*[ABK]|\?25[hl])|\r)")
 
 
 class Harmless:
-    """A text stream that escapes terminal control sequences, as ``\\x1b``, so that file contents cannot trigger them.
+    """A text stream that escapes terminal control sequences, as ``\\x1b``, so that file contents
+    cannot trigger them.
 
     Parameters
     ----------
     stream : the text stream to write to
-    kept : matches, as one group, the control sequences that pass unchanged if the stream is a terminal
+    kept : matches, as one group, the control sequences that pass unchanged if the stream is a
+        terminal
     """
 
     def __init__(self, stream: Any, kept: re.Pattern[str]) -> None:
@@ -129,7 +141,10 @@ class Harmless:
     def write(self, text: str) -> int:
         """Write a text; return its length."""
         parts = self._kept.split(text) if self._stream.isatty() else [text]
-        self._try(self._stream.write, "".join(part if i % 2 else harmless(part) for i, part in enumerate(parts)))
+        self._try(
+            self._stream.write,
+            "".join(part if i % 2 else harmless(part) for i, part in enumerate(parts)),
+        )
         return len(text)
 
     def flush(self) -> None:
@@ -137,14 +152,19 @@ class Harmless:
         self._try(self._stream.flush)
 
     def _try(self, act: Callable[..., Any], *given: Any) -> None:
-        """Write; a stream that nobody reads any more swallows the rest, as does a stderr that is full."""
+        """Write; a stream that nobody reads any more swallows the rest, as does a stderr that is
+        full."""
         try:
             act(*given)
         except (OSError, ValueError) as error:
-            with suppress(OSError, ValueError):  # what waits is not tried again at the end of the process
+            with suppress(
+                OSError, ValueError
+            ):  # what waits is not tried again at the end of the process
                 os.dup2(os.open(os.devnull, os.O_WRONLY), self._stream.fileno())
             if self._stream is sys.__stdout__ and not isinstance(error, BrokenPipeError):
-                raise UnwritableError(f"standard output: {getattr(error, 'strerror', None) or error}") from error
+                raise UnwritableError(
+                    f"standard output: {getattr(error, 'strerror', None) or error}"
+                ) from error
 
 
 class UnwritableError(IapbError):
@@ -152,8 +172,8 @@ class UnwritableError(IapbError):
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the command line; return the exit status: 0 done, 1 a named error, 2 wrong usage, 3 a result that is
-    not to be trusted, 130 interrupted."""
+    """Run the command line; return the exit status: 0 done, 1 a named error, 2 wrong usage, 3 a
+    result that is not to be trusted, 130 interrupted."""
     if arguments is None:
         signal.signal(signal.SIGTERM, _end_politely)
         _open_closed_streams()
@@ -166,8 +186,9 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _status(given: list[str]) -> int:
-    """Run the command line and return its status. A usage error of typer's is known by its attributes, since typer
-    has its own copy of click or the installed one; any other unnamed error is a bug and raised."""
+    """Run the command line and return its status. A usage error of typer's is known by its
+    attributes, since typer has its own copy of click or the installed one; any other unnamed error
+    is a bug and raised."""
     explained = False
     try:
         _refuse_empty(given)
@@ -175,7 +196,11 @@ def _status(given: list[str]) -> int:
     except (KeyboardInterrupt, typer.Abort):
         status, said = 130, STOPPED
     except (IapbError, OSError, ModuleNotFoundError) as missing:
-        error = name_the_extra(missing, "The command") if isinstance(missing, ModuleNotFoundError) else missing
+        error = (
+            name_the_extra(missing, "The command")
+            if isinstance(missing, ModuleNotFoundError)
+            else missing
+        )
         if "--debug" in given or not isinstance(error, IapbError | OSError):
             raise
         status, said = 1, str(error)
@@ -197,30 +222,36 @@ def _status(given: list[str]) -> int:
 
 
 def _open_closed_streams() -> None:
-    """Give streams that the caller closed (``>&-``) a place: else the next file that is opened gets their number."""
+    """Give streams that the caller closed (``>&-``) a place: else the next file that is opened gets
+    their number."""
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         try:
             os.fstat(number)
         except OSError:
             os.open(os.devnull, os.O_RDWR)  # takes the lowest free number
-            setattr(sys, name, open(number, "w" if number else "r", encoding="utf-8", closefd=False))  # noqa: SIM115
+            mode = "w" if number else "r"
+            stream = open(number, mode, encoding="utf-8", closefd=False)  # noqa: SIM115
+            setattr(sys, name, stream)
 
 
 def _end_politely(*_: object) -> None:
-    """Handle SIGTERM (from a batch system or a time limit) like Ctrl-C, so that finished files are kept. This also
-    works in a background job, where the shell makes the process ignore SIGINT."""
+    """Handle SIGTERM (from a batch system or a time limit) like Ctrl-C, so that finished files are
+    kept. This also works in a background job, where the shell makes the process ignore SIGINT."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         raise KeyboardInterrupt
     signal.raise_signal(signal.SIGINT)
 
 
 def _refuse_empty(given: list[str]) -> None:
-    """Refuse empty values: a shell makes one of an unset variable, and as a path it would mean this folder."""
+    """Refuse empty values: a shell makes one of an unset variable, and as a path it would mean this
+    folder."""
     for i, (before, word) in enumerate(pairwise(["", *given]), 1):
         option, equals, value = word.partition("=") if word.startswith("--") else ("", "", "")
         if not word or (equals and not value):
             name = option or (before if before.startswith("--") else f"argument {i}")
-            raise ArgumentError(name, "", "a value that is not empty (a shell variable that is not set?)")
+            raise ArgumentError(
+                name, "", "a value that is not empty (a shell variable that is not set?)"
+            )
 
 
 if __name__ == "__main__":

@@ -15,13 +15,17 @@ CRATE_NAME = "ro-crate-metadata.json"
 PROFILE = "https://w3id.org/ro/crate/1.1"
 LICENSE = "https://spdx.org/licenses/MIT"
 PAPER = (
-    "D. Constantinescu, S. E. Salcudean, E. A. Croft: Haptic rendering of rigid contacts using impulsive and penalty "
+    "D. Constantinescu, S. E. Salcudean, E. A. Croft: Haptic rendering of rigid contacts using "
+    "impulsive and penalty "
     "forces, IEEE Transactions on Robotics 21(3), 2005"
 )
 PARTS = {
     FIRST_PAGE: ("File", "the first page of the report"),
     "report/": ("Dataset", "its other pages"),
-    NUMBERS_NAME: ("File", "every number of the report, and the content hash of each run by its command"),
+    NUMBERS_NAME: (
+        "File",
+        "every number of the report, and the content hash of each run by its command",
+    ),
     "runs/": ("Dataset", "the runs that the numbers were computed from"),
 }
 
@@ -30,7 +34,12 @@ def write_crate(out: Path, facts: Mapping[str, str]) -> Path:
     """Write the metadata of a report in `out`, given its provenance."""
     parts = [{"@id": name, "@type": kind, "name": text} for name, (kind, text) in PARTS.items()]
     graph = [
-        {"@id": CRATE_NAME, "@type": "CreativeWork", "conformsTo": {"@id": PROFILE}, "about": {"@id": "./"}},
+        {
+            "@id": CRATE_NAME,
+            "@type": "CreativeWork",
+            "conformsTo": {"@id": PROFILE},
+            "about": {"@id": "./"},
+        },
         {
             "@id": "./",
             "@type": "Dataset",

@@ -1,4 +1,5 @@
-"""The provenance of a result: code, packages, processor and command, but no machine path and no host name."""
+"""The provenance of a result: code, packages, processor and command, but no machine path and no
+host name."""
 
 from __future__ import annotations
 
@@ -18,35 +19,61 @@ from pathlib import Path
 _ROOT = Path(__file__).resolve().parent.parent
 _PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "h5py")
 # Packages that a report compares with or uses for its proofs.
-PEERS = ("pin", "coal", "cvxpy", "clarabel", "qpsolvers", "daqp", "quadprog", "proxsuite", "quantecon", "sympy",
-         "python-flint", "hypothesis", "mujoco")  # fmt: skip
+PEERS = (
+    "pin",
+    "coal",
+    "cvxpy",
+    "clarabel",
+    "qpsolvers",
+    "daqp",
+    "quadprog",
+    "proxsuite",
+    "quantecon",
+    "sympy",
+    "python-flint",
+    "hypothesis",
+    "mujoco",
+)
 UNKNOWN = "unknown"
 NOT_INSTALLED = "not installed"
 
 
-def collect_provenance(seeds: Sequence[int | str] = (), packages: Sequence[str] = ()) -> dict[str, str]:
+def collect_provenance(
+    seeds: Sequence[int | str] = (), packages: Sequence[str] = ()
+) -> dict[str, str]:
     """Return the facts needed to reproduce a result, as texts by name.
 
     Parameters
     ----------
     seeds : seeds of the random numbers used, if any, each with or without its name.
-    packages : further packages whose versions are stated, besides those that every result depends on.
+    packages : further packages whose versions are stated, besides those that every result depends
+        on.
     """
     given = {"seeds": ", ".join(map(str, seeds)) or "none", "command": current_command()}
     versions = {package: package_version(package) for package in packages}
-    return _facts() | given | {package: NOT_INSTALLED if found == UNKNOWN else found
-                               for package, found in versions.items()}  # fmt: skip
+    return (
+        _facts()
+        | given
+        | {
+            package: NOT_INSTALLED if found == UNKNOWN else found
+            for package, found in versions.items()
+        }
+    )
 
 
 def current_command() -> str:
-    """Return the command line of this process; paths that are absolute or contain ".." are cut to their last part."""
+    """Return the command line of this process; paths that are absolute or contain ".." are cut to
+    their last part."""
+
     def portable(word: str) -> str:
         option, equals, value = word.partition("=") if word.startswith("--") else ("", "", word)
         path = Path(value)
         return f"{option}{equals}{path.name}" if path.is_absolute() or ".." in path.parts else word
 
     program = Path(sys.argv[0])
-    name = "iapb" if program.resolve() == _ROOT / "reports" / "cli.py" else program.name  # as python -m reports.cli
+    name = (
+        "iapb" if program.resolve() == _ROOT / "reports" / "cli.py" else program.name
+    )  # as python -m reports.cli
     return shlex.join([name or "python", *map(portable, sys.argv[1:])])
 
 
@@ -94,7 +121,8 @@ def processor() -> str:
 def linear_algebra() -> str:
     """Return the BLAS of numpy: name, version, kernel family and threads.
 
-    The BLAS libraries of other packages are ignored, so that a key does not depend on which packages are loaded.
+    The BLAS libraries of other packages are ignored, so that a key does not depend on which
+    packages are loaded.
     """
     import numpy as np
     from threadpoolctl import threadpool_info
@@ -102,39 +130,59 @@ def linear_algebra() -> str:
     np.linalg.norm(np.ones(2))  # a BLAS is listed once it is loaded
     pools = [pool for pool in threadpool_info() if pool["user_api"] == "blas"]
     own = [pool for pool in pools if "numpy" in Path(pool["filepath"]).parent.name] or pools
-    found = {f"{pool['internal_api']} {pool.get('version')} {pool.get('architecture', '')} x{pool['num_threads']}"
-             for pool in own}  # fmt: skip
+    found = {
+        f"{pool['internal_api']} {pool.get('version')} {pool.get('architecture', '')} x{pool['num_threads']}"
+        for pool in own
+    }
     return "; ".join(sorted(found)) or UNKNOWN
 
 
 def dispatched() -> str:
-    """Return the CPU features whose optional code numpy uses here; NPY_DISABLE_CPU_FEATURES can disable some."""
+    """Return the CPU features whose optional code numpy uses here; NPY_DISABLE_CPU_FEATURES can
+    disable some."""
     try:
         numpy = import_module("numpy._core._multiarray_umath")
-        return " ".join(name for name in numpy.__cpu_dispatch__ if numpy.__cpu_features__[name]) or "baseline"
+        return (
+            " ".join(name for name in numpy.__cpu_dispatch__ if numpy.__cpu_features__[name])
+            or "baseline"
+        )
     except (ImportError, AttributeError):  # numpy does not promise these names
         return UNKNOWN
 
 
 def machine_parts(facts: Mapping[str, str]) -> dict[str, str]:
-    """Return the provenance facts besides the code that can change last bits: processor, BLAS, numpy's CPU features.
+    """Return the provenance facts besides the code that can change last bits: processor, BLAS,
+    numpy's CPU features.
 
     The number of threads is left out, because it can change within a process.
     """
     kernels = sorted(set(re.findall(r"(\S+) x\d+", facts.get("blas", ""))))
     simd = f"numpy {facts['simd']}" if "simd" in facts else ""
-    return {"cpu": facts.get("cpu", ""), "BLAS kernel": " and ".join(kernels), "CPU features of numpy": simd}
+    return {
+        "cpu": facts.get("cpu", ""),
+        "BLAS kernel": " and ".join(kernels),
+        "CPU features of numpy": simd,
+    }
 
 
 @cache
 def this_machine() -> str:
-    """Return `machine_parts` of this process as one text; it is part of the keys of computed stages."""
+    """Return `machine_parts` of this process as one text; it is part of the keys of computed
+    stages."""
     parts = machine_parts({"cpu": processor(), "blas": linear_algebra(), "simd": dispatched()})
     return ", ".join(text for text in parts.values() if text)
 
 
 # Files that can change a result; changes of other files are ignored.
-_TRACED = ("iapb", "reference", "verification", "reports", "scenes", "requirements.lock", "pyproject.toml")
+_TRACED = (
+    "iapb",
+    "reference",
+    "verification",
+    "reports",
+    "scenes",
+    "requirements.lock",
+    "pyproject.toml",
+)
 
 
 def uncommitted_changes() -> str:
@@ -159,7 +207,12 @@ def _git(*arguments: str) -> str | None:
     if not (_ROOT / ".git").exists():
         return None
     with suppress(OSError, subprocess.SubprocessError):
-        done = subprocess.run(["git", "-C", str(_ROOT), *arguments], capture_output=True, text=True, timeout=20,
-                              check=False)  # fmt: skip
+        done = subprocess.run(
+            ["git", "-C", str(_ROOT), *arguments],
+            capture_output=True,
+            text=True,
+            timeout=20,
+            check=False,
+        )
         return done.stdout.strip() if done.returncode == 0 else None
     return None

@@ -4,7 +4,8 @@
     pages = build_report(evidence, draw_all(evidence))
     write_report("out", pages)
 
-A report whose sources, results and files have not changed is not made again: its answer is kept beside its tables.
+A report whose sources, results and files have not changed is not made again: its answer is kept
+beside its tables.
 """
 
 from __future__ import annotations
@@ -49,31 +50,48 @@ def write_report(folder: str | Path, pages: Mapping[str, str]) -> Path:
     return Path(folder) / FIRST_PAGE
 
 
-def write_companions(out: Path, evidence: Evidence, figures: Iterable[Figure], depth: str) -> tuple[Path, ...]:
+def write_companions(
+    out: Path, evidence: Evidence, figures: Iterable[Figure], depth: str
+) -> tuple[Path, ...]:
     """Write the numbers and the RO-Crate metadata; return the files."""
     numbers = write_numbers(out / NUMBERS_NAME, collect_numbers(evidence, figures, depth))
     return numbers, write_crate(out, evidence.provenance)
 
 
 def report_key(out: Path, depth: str) -> str:
-    """Return a hash of what a report in `out` is made from, besides its files: code, machine, packages, command."""
+    """Return a hash of what a report in `out` is made from, besides its files: code, machine,
+    packages, command."""
     folder = Path(__file__).parent / "pages"
-    return hash_of({
-        "folder": str(out.absolute()), "depth": depth, "code": [evidence_version(), sources_hash("reports")],
-        "pages": [folder_hash(folder / part) for part in ("templates", "scripts")],
-        "depends": {stage: depends_of(stage) for stage in (*FOLDERS, *PACKAGES, "proofs")},
-        "facts": collect_provenance(packages=PEERS), "coq": checked.read(),
-    })  # fmt: skip
+    return hash_of(
+        {
+            "folder": str(out.absolute()),
+            "depth": depth,
+            "code": [evidence_version(), sources_hash("reports")],
+            "pages": [folder_hash(folder / part) for part in ("templates", "scripts")],
+            "depends": {stage: depends_of(stage) for stage in (*FOLDERS, *PACKAGES, "proofs")},
+            "facts": collect_provenance(packages=PEERS),
+            "coq": checked.read(),
+        }
+    )
 
 
-def keep_answer(out: Path, key: str, facts: Mapping[str, Any], lines: Sequence[str], made_from: Iterable[str]) -> None:
-    """Keep the answer of a finished report and the state of its files; paths are relative to `out`."""
-    kept = {"key": key, "facts": facts, "lines": lines, "files": _states(out, (*made_from, *_WRITTEN))}
+def keep_answer(
+    out: Path, key: str, facts: Mapping[str, Any], lines: Sequence[str], made_from: Iterable[str]
+) -> None:
+    """Keep the answer of a finished report and the state of its files; paths are relative to
+    `out`."""
+    kept = {
+        "key": key,
+        "facts": facts,
+        "lines": lines,
+        "files": _states(out, (*made_from, *_WRITTEN)),
+    }
     write_whole(out / ANSWER, json.dumps(plain(kept)))
 
 
 def kept_answer(out: Path, key: str) -> tuple[dict[str, Any], list[str]] | None:
-    """Return the facts and lines that were kept with this key, or None if a file of the report has changed since."""
+    """Return the facts and lines that were kept with this key, or None if a file of the report has
+    changed since."""
     with suppress(OSError, ValueError, KeyError, TypeError):
         kept = json.loads((out / ANSWER).read_text(encoding="utf-8"))
         if kept["key"] == key and kept["files"] == _states(out, kept["files"]):
@@ -85,4 +103,7 @@ def _states(out: Path, names: Iterable[str]) -> dict[str, list[int]]:
     """Return size and time of the last change of each file that exists; [] for the others."""
     paths = {name: out / name for name in names}
     found = {name: path.stat() for name, path in paths.items() if path.exists()}
-    return {name: [found[name].st_size, found[name].st_mtime_ns] if name in found else [] for name in paths}
+    return {
+        name: [found[name].st_size, found[name].st_mtime_ns] if name in found else []
+        for name in paths
+    }

@@ -30,15 +30,17 @@ LAWS = {
     "penalty": ("iapb.contact.laws", "Penalty"),
     "rigid constraints": ("reference.time_stepping", "RigidConstraints"),
 }
-COUPLINGS: dict[str, Any] = {kind.name: kind for kind in (NoCoupling, FourChannel, UnilateralCoupler)}
+COUPLINGS: dict[str, Any] = {
+    kind.name: kind for kind in (NoCoupling, FourChannel, UnilateralCoupler)
+}
 
 
 @dataclass(frozen=True)
 class Change:
     """One result that differs between the stored and the repeated run, and how.
 
-    largest : largest absolute difference of the numbers; infinite if they cannot be subtracted (different shapes, or a
-        NaN in one of the two).
+    largest : largest absolute difference of the numbers; infinite if they cannot be subtracted
+        (different shapes, or a NaN in one of the two).
     """
 
     name: str
@@ -51,7 +53,8 @@ class Change:
 
 @dataclass(frozen=True)
 class Repetition:
-    """The comparison of a stored run with its repetition: both content hashes, and the results that differ."""
+    """The comparison of a stored run with its repetition: both content hashes, and the results that
+    differ."""
 
     stored: str
     again: str
@@ -71,14 +74,22 @@ def repeat_run(path: Path | str) -> Repetition:
     RunFileError
         The file is not a run, or it is damaged.
     ArgumentError
-        The law or coupling is not one of the project's, or the mouse pulled the tool, so the file alone does not
-        suffice to repeat the run.
+        The law or coupling is not one of the project's, or the mouse pulled the tool, so the file
+        alone does not suffice to repeat the run.
     """
     stored = read_run(path)
     if PULLED in stored.remarks:
-        raise ArgumentError("path", str(path), "a run without the mouse, which its scene gives again")
-    again = simulate(scene_of(stored), law_of(stored), coupling_of(stored), world=stored.world,
-                     steps=stored.steps_done, every=stored.every)
+        raise ArgumentError(
+            "path", str(path), "a run without the mouse, which its scene gives again"
+        )
+    again = simulate(
+        scene_of(stored),
+        law_of(stored),
+        coupling_of(stored),
+        world=stored.world,
+        steps=stored.steps_done,
+        every=stored.every,
+    )
     return Repetition(content_hash(stored), content_hash(again), differences(stored, again))
 
 
@@ -90,7 +101,8 @@ def scene_of(run: Run) -> Scene:
 
 
 def law_of(run: Run) -> Any:
-    """Return the contact law of a run with its settings: one of LAWS, or the law of the run's world."""
+    """Return the contact law of a run with its settings: one of LAWS, or the law of the run's
+    world."""
     if run.law in LAWS:
         module, name = LAWS[run.law]
         return _made(getattr(import_module(module), name), run.law_settings)
@@ -99,8 +111,12 @@ def law_of(run: Run) -> Any:
         law = find_world(run.world).law
     law = law.within(scene_of(run)) if hasattr(law, "within") else law
     if law is None or (law.name, dict(law.settings)) != (run.law, dict(run.law_settings)):
-        raise ArgumentError("law", run.law,
-                            one_of(run.law, LAWS) + ", or the law of a world; other laws are not stored in the file")
+        raise ArgumentError(
+            "law",
+            run.law,
+            one_of(run.law, LAWS)
+            + ", or the law of a world; other laws are not stored in the file",
+        )
     return law
 
 
@@ -113,23 +129,38 @@ def coupling_of(run: Run) -> Coupling:
 
 
 def _made(kind: Any, settings: Any) -> Any:
-    """Return a law or coupling with those settings that it takes; the other ones only describe it."""
+    """Return a law or coupling with those settings that it takes; the other ones only describe
+    it."""
     names = {field.name for field in fields(kind) if field.init}
     try:
-        return kind(**{name: tuple(value) if isinstance(value, list) else value
-                       for name, value in settings.items() if name in names})  # fmt: skip
+        return kind(
+            **{
+                name: tuple(value) if isinstance(value, list) else value
+                for name, value in settings.items()
+                if name in names
+            }
+        )
     except (TypeError, AttributeError) as error:  # settings of a file
         raise ArgumentError("settings", settings, f"those of {kind.name}") from error
 
 
 def differences(stored: Run, again: Run) -> tuple[Change, ...]:
-    """Return every result that is not equal bit for bit; there is none if the content hashes are equal."""
-    heads, arrays = (result_head(stored), result_head(again)), (dict(results_of(stored)), dict(results_of(again)))
-    found = [Change(name, f"is {heads[1][name]}, was {old}") for name, old in heads[0].items()
-             if canonical_json(old) != canonical_json(heads[1][name])]  # fmt: skip
+    """Return every result that is not equal bit for bit; there is none if the content hashes are
+    equal."""
+    heads, arrays = (
+        (result_head(stored), result_head(again)),
+        (dict(results_of(stored)), dict(results_of(again))),
+    )
+    found = [
+        Change(name, f"is {heads[1][name]}, was {old}")
+        for name, old in heads[0].items()
+        if canonical_json(old) != canonical_json(heads[1][name])
+    ]
     for name in dict.fromkeys([*arrays[0], *arrays[1]]):
         if any(name not in side for side in arrays):
-            found.append(Change(name, "only stored" if name in arrays[0] else "only simulated again"))
+            found.append(
+                Change(name, "only stored" if name in arrays[0] else "only simulated again")
+            )
         else:
             found.extend(_changes(name, *(np.asarray(side[name]) for side in arrays)))
     return tuple(found)
@@ -143,7 +174,11 @@ def _changes(name: str, stored: np.ndarray, again: np.ndarray) -> Iterator[Chang
         a, b = stored[other].astype(float), again[other].astype(float)
         bits = np.isnan(a) & np.isnan(b)
         if np.all(bits):
-            yield Change(name, "in bits that no comparison of numbers shows (the sign of a zero, a NaN)", 0.0)
+            yield Change(
+                name, "in bits that no comparison of numbers shows (the sign of a zero, a NaN)", 0.0
+            )
             return
         largest = float(np.max(np.nan_to_num(np.abs(a[~bits] - b[~bits]), nan=np.inf)))
-        yield Change(name, f"by at most {largest:.2g} in {np.sum(~bits)} of {stored.size} values", largest)
+        yield Change(
+            name, f"by at most {largest:.2g} in {np.sum(~bits)} of {stored.size} values", largest
+        )

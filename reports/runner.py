@@ -1,4 +1,5 @@
-"""Runs of the paper's worlds through the store: a run is computed once and then read from its file."""
+"""Runs of the paper's worlds through the store: a run is computed once and then read from its
+file."""
 
 from __future__ import annotations
 
@@ -34,19 +35,27 @@ class Runner:
         self.store = RunStore(folder)
         self.progress = progress
         self.used: dict[str, StoredFile] = {}  # by file name, in the order of use
-        self.files: set[str] = set()  # of all runs used so far, inside and outside of an open `recording`
+        self.files: set[str] = (
+            set()
+        )  # of all runs used so far, inside and outside of an open `recording`
         self.user = ""  # the user recorded for the runs requested now
         self._held: dict[str, tuple[Run, RunEntry]] = {}
         self._known: dict[str, StoredFile] = {}
         self._places: dict[tuple[int, str, str, int], tuple[Place, Scene]] = {}
 
     def __call__(
-        self, scene: Scene, world: str, rendering: str = "full", *, keep: bool = True, partial: bool = False
+        self,
+        scene: Scene,
+        world: str,
+        rendering: str = "full",
+        *,
+        keep: bool = True,
+        partial: bool = False,
     ) -> Run:
         """Return the run of `scene` in `world`.
 
-        An incomplete run is stored as partial. Then the error that stopped it is raised; with `partial` the run is
-        returned instead.
+        An incomplete run is stored as partial. Then the error that stopped it is raised; with
+        `partial` the run is returned instead.
         """
         place = self.place_of(scene, world, rendering)
         name = place.path.name
@@ -59,14 +68,23 @@ class Runner:
         self.use_again(scene, world, rendering)
         return run
 
-    def fetch(self, scene: Scene, world: str, rendering: str = "full", every: int = 1) -> tuple[Run, RunEntry]:
+    def fetch(
+        self, scene: Scene, world: str, rendering: str = "full", every: int = 1
+    ) -> tuple[Run, RunEntry]:
         """Read or compute a run, which may be partial; return it with the entry of its file.
 
         every : keep every N-th step (see `iapb.simulation.simulate`).
         """
         found = find_world(world, rendering)
-        compute = given(one_thread()(simulate), scene, found.law, found.coupling_in(scene),
-                        world=_label(world, rendering), every=every, progress=self.progress)
+        compute = given(
+            one_thread()(simulate),
+            scene,
+            found.law,
+            found.coupling_in(scene),
+            world=_label(world, rendering),
+            every=every,
+            progress=self.progress,
+        )
         return self.store.fetch(self.place_of(scene, world, rendering, every), compute)
 
     @contextmanager
@@ -103,16 +121,25 @@ class Runner:
     def place_of(self, scene: Scene, world: str, rendering: str = "full", every: int = 1) -> Place:
         """Return the place of a run."""
         asked = id(scene), world, rendering, every
-        if asked not in self._places:  # a key costs a millisecond; the scene is held, so that its id stays its own
+        if (
+            asked not in self._places
+        ):  # a key costs a millisecond; the scene is held, so that its id stays its own
             found = find_world(world, rendering)
             inputs = run_inputs(scene, found.law, found.coupling_in(scene), world, every)
-            self._places[asked] = self.store.place_of(inputs, self.label(scene, world, rendering)), scene
+            self._places[asked] = (
+                self.store.place_of(inputs, self.label(scene, world, rendering)),
+                scene,
+            )
         return self._places[asked][0]
 
     def _know(self, entry: RunEntry, scene: Scene, world: str, rendering: str) -> None:
         name = self.file_of(scene, world, rendering)
-        if name not in self._known or self._known[name].file != entry.file:  # a partial run has another file
-            command = run_command(scene, world, rendering) or f"iapb store again out/runs/{entry.file}"
+        if (
+            name not in self._known or self._known[name].file != entry.file
+        ):  # a partial run has another file
+            command = (
+                run_command(scene, world, rendering) or f"iapb store again out/runs/{entry.file}"
+            )
             self._known[name] = StoredFile(entry.file, entry.content_hash, command)
 
     @staticmethod
@@ -129,7 +156,11 @@ def _label(world: str, rendering: str) -> str:
 def run_inputs(scene: Scene, law: Any, coupling: Any, world: str, every: int = 1) -> dict[str, Any]:
     """Return everything that determines a run, besides the code."""
     return {
-        "scene": scene.resolved(), "law": law.name, "law settings": dict(law.settings),
-        "coupling": coupling.name, "coupling settings": dict(coupling.settings), "world": world,
+        "scene": scene.resolved(),
+        "law": law.name,
+        "law settings": dict(law.settings),
+        "coupling": coupling.name,
+        "coupling settings": dict(coupling.settings),
+        "world": world,
         "every": every,
-    }  # fmt: skip
+    }

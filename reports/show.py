@@ -1,4 +1,5 @@
-"""What a command shows: its answer as sentences and tables or as JSON, and the progress of its work."""
+"""What a command shows: its answer as sentences and tables or as JSON, and the progress of its
+work."""
 
 from __future__ import annotations
 
@@ -32,7 +33,8 @@ _LONGEST_ERROR = 400  # characters
 
 @dataclass(frozen=True)
 class Answer:
-    """What a command returns: `facts` are printed with --json, otherwise `lines` are; exit statuses do not differ."""
+    """What a command returns: `facts` are printed with --json, otherwise `lines` are; exit statuses
+    do not differ."""
 
     facts: Any
     lines: Sequence[str | Table]
@@ -52,21 +54,32 @@ def one_line(name: Any) -> str:
 
 
 def said(error: Exception, path: Any) -> str:
-    """Return on one line what an error says, without the path that begins it; foreign errors with their kind."""
+    """Return on one line what an error says, without the path that begins it; foreign errors with
+    their kind."""
     kind = "" if isinstance(error, IapbError) else f"{type(error).__name__}: "
     return kind + one_line(" ".join(str(error).removeprefix(f"{path}: ").split()))[:_LONGEST_ERROR]
 
 
 def sentence(text: str, mark: str = "") -> str:
-    """Return a wrapped sentence after its mark; the following lines are indented by the length of the mark."""
-    return textwrap.fill(text, WIDTH, initial_indent=mark, subsequent_indent=" " * len(mark), break_on_hyphens=False,
-                         break_long_words=False)  # fmt: skip
+    """Return a wrapped sentence after its mark; the following lines are indented by the length of
+    the mark."""
+    return textwrap.fill(
+        text,
+        WIDTH,
+        initial_indent=mark,
+        subsequent_indent=" " * len(mark),
+        break_on_hyphens=False,
+        break_long_words=False,
+    )
 
 
 def table_text(table: Table) -> str:
-    """Return a table as text. A table that is too wide continues below, with its first column repeated."""
-    columns = [_wrapped(title, [_text(row[k], table.digits) for row in table.cells])
-               for k, title in enumerate(table.titles)]  # fmt: skip
+    """Return a table as text. A table that is too wide continues below, with its first column
+    repeated."""
+    columns = [
+        _wrapped(title, [_text(row[k], table.digits) for row in table.cells])
+        for k, title in enumerate(table.titles)
+    ]
     blocks = [columns[:1]]
     for column in columns[1:]:
         if all(cell == ["-"] for cell in column[1:]):
@@ -86,7 +99,8 @@ def _text(value: Any, digits: int) -> str:
 
 
 def _wrapped(title: str, texts: list[str]) -> list[list[str]]:
-    """Return heading and cells as lines; the heading is as wide as the widest cell or its longest word with unit."""
+    """Return heading and cells as lines; the heading is as wide as the widest cell or its longest
+    word with unit."""
     whole = re.sub(r"\[[^]]*\]$", lambda unit: unit[0].replace(" ", "\N{NO-BREAK SPACE}"), title)
     cells = [textwrap.wrap(text, _WIDEST) or [""] for text in texts]
     widest = max(map(len, [*(line for cell in cells for line in cell), *whole.split()]), default=1)
@@ -101,11 +115,19 @@ def _printed(columns: list[list[list[str]]]) -> str:
     widths, lines = [_width(column) - len(_GAP) for column in columns], list[str]()
     for number, row in enumerate(zip(*columns, strict=True)):
         height = max(map(len, row))
-        full = [[""] * (height - len(cell)) + cell if number == 0 else cell + [""] * (height - len(cell))
-                for cell in row]  # headings stand on the rule
+        full = [
+            [""] * (height - len(cell)) + cell
+            if number == 0
+            else cell + [""] * (height - len(cell))
+            for cell in row
+        ]  # headings stand on the rule
         for first, *others in zip(*full, strict=True):
             placed = [text.rjust(width) for text, width in zip(others, widths[1:], strict=True)]
-            lines.append(_GAP.join([first.ljust(widths[0]), *placed]).replace("\N{NO-BREAK SPACE}", " ").rstrip())
+            lines.append(
+                _GAP.join([first.ljust(widths[0]), *placed])
+                .replace("\N{NO-BREAK SPACE}", " ")
+                .rstrip()
+            )
         if number == 0:
             lines.append("-" * min(WIDTH, sum(widths) + len(_GAP) * (len(widths) - 1)))
     return "\n".join(lines)
@@ -125,11 +147,14 @@ def counted(count: int, noun: str) -> str:
 
 
 @contextmanager
-def stage_progress(begun: str = "", transient: bool = False) -> Iterator[Callable[[str, int, int], None]]:
-    """Show which stage is running and how far it is: progress(stage, done, total); also that kernels are compiled.
+def stage_progress(
+    begun: str = "", transient: bool = False
+) -> Iterator[Callable[[str, int, int], None]]:
+    """Show which stage is running and how far it is: progress(stage, done, total); also that
+    kernels are compiled.
 
-    On a terminal these are bars: the stage `begun` is shown before its first report, `transient` bars vanish at the
-    end. In a log these are lines, without one at the start of the stage `begun`.
+    On a terminal these are bars: the stage `begun` is shown before its first report, `transient`
+    bars vanish at the end. In a log these are lines, without one at the start of the stage `begun`.
     """
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
@@ -140,9 +165,17 @@ def stage_progress(begun: str = "", transient: bool = False) -> Iterator[Callabl
             yield log
         return
     name = TextColumn("{task.description}", markup=False)  # a scene's name may hold brackets
-    # Only output to the same terminal is printed above the bars: a redirected stdout must not be sent to stderr.
-    bars = Progress(name, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), console=console, transient=transient,
-                    redirect_stdout=sys.stdout.isatty())  # fmt: skip
+    # Only output to the same terminal is printed above the bars: a redirected stdout must not be
+    # sent to stderr.
+    bars = Progress(
+        name,
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        console=console,
+        transient=transient,
+        redirect_stdout=sys.stdout.isatty(),
+    )
     with bars, compiling_told(bars.console.print):
         tasks = {harmless(begun): bars.add_task(harmless(begun), total=None)} if begun else {}
 
@@ -157,7 +190,8 @@ def stage_progress(begun: str = "", transient: bool = False) -> Iterator[Callabl
 
 @contextmanager
 def _logged(begun: str) -> Iterator[Callable[[str, int, int], None]]:
-    """Write a line when a stage begins, and every SILENCE seconds, as a single step may take minutes, how far it is."""
+    """Write a line when a stage begins, and every SILENCE seconds, as a single step may take
+    minutes, how far it is."""
     stages, start, over = {begun: (0, 0)}, time.monotonic(), Event()
 
     def progress(stage: str, done: int, total: int) -> None:
@@ -171,7 +205,9 @@ def _logged(begun: str) -> Iterator[Callable[[str, int, int], None]]:
             going = {stage: far for stage, far in stages.copy().items() if far[0] < far[1]}
             for stage in before.intersection(going):
                 done, total = going[stage]
-                to_stderr(f"{stage}: {done:,} of {total:,} after {(time.monotonic() - start) / 60.0:.1f} min")
+                to_stderr(
+                    f"{stage}: {done:,} of {total:,} after {(time.monotonic() - start) / 60.0:.1f} min"
+                )
             before = set(going)
 
     thread = Thread(target=remind, daemon=True)

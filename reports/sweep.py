@@ -1,4 +1,5 @@
-"""Sweeps: one scene with every combination of some values; a run per point, and a table of all points.
+"""Sweeps: one scene with every combination of some values; a run per point, and a table of all
+points.
 
 out/sweeps/<study>/runs/*.h5    one run file per point; a point that has one is not simulated again
 out/sweeps/<study>/points.nc    the table: `xarray.open_dataset(path, engine="h5netcdf")`
@@ -111,7 +112,8 @@ def simulate_point(scene: Scene, folder: Path, code: str, point: dict[str, Any])
 
 
 def write_points(path: Path, study: Study, rows: list[dict[str, Any]]) -> None:
-    """Write the table of all points: an xarray Dataset with an axis for the worlds and for each path."""
+    """Write the table of all points: an xarray Dataset with an axis for the worlds and for each
+    path."""
     from xarray import Dataset
 
     axes = {name: list(values) for name, values in study.axes().items()}

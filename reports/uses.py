@@ -33,9 +33,11 @@ class StoredFile:
 
 
 def run_command(scene: Scene, world: str, rendering: str = "full") -> str:
-    """Return the `iapb run` command that simulates this scene in this world; "" if no scene of the project matches.
+    """Return the `iapb run` command that simulates this scene in this world; "" if no scene of the
+    project matches.
 
-    The values in the command are checked: parsed as the command parses them, they must give the scene to the last bit.
+    The values in the command are checked: parsed as the command parses them, they must give the
+    scene to the last bit.
     """
     if scene.name not in scene_names():
         return ""
@@ -46,15 +48,27 @@ def run_command(scene: Scene, world: str, rendering: str = "full") -> str:
             set_value(again, path, value)
     except IapbError:
         return ""
-    words = ["iapb", "run", scene.name, *(word for text in sets for word in ("--set", text)), "--world", world]
-    return shlex.join(words + ["--rendering", rendering] * (rendering != "full")) if again == wanted else ""
+    words = [
+        "iapb",
+        "run",
+        scene.name,
+        *(word for text in sets for word in ("--set", text)),
+        "--world",
+        world,
+    ]
+    return (
+        shlex.join(words + ["--rendering", rendering] * (rendering != "full"))
+        if again == wanted
+        else ""
+    )
 
 
 _INDEX = re.compile(r"\[(\d+)\]")  # as messages write a place in a list
 
 
 def parsed(assignments: list[str]) -> dict[str, Any]:
-    """Turn ``path=value`` into values by path (``bodies[0].mass`` or ``bodies.0.mass``); values are read as YAML."""
+    """Turn ``path=value`` into values by path (``bodies[0].mass`` or ``bodies.0.mass``); values are
+    read as YAML."""
     values = {}
     for text in assignments:
         path, equals, value = text.partition("=")
@@ -64,7 +78,9 @@ def parsed(assignments: list[str]) -> dict[str, Any]:
             values[_INDEX.sub(r".\1", path.strip())] = Document(value).value
         except SceneError as error:
             said = error.mistakes[0].expected
-            raise ArgumentError("--set", text, f"a YAML value after the equals sign: {said}") from None
+            raise ArgumentError(
+                "--set", text, f"a YAML value after the equals sign: {said}"
+            ) from None
     return values
 
 
@@ -74,11 +90,17 @@ def _shipped(name: str) -> Scene:
 
 
 def changes(old: Any, new: Any, path: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield (dotted path, new value) for each difference of two resolved scenes, at the deepest possible path.
+    """Yield (dotted path, new value) for each difference of two resolved scenes, at the deepest
+    possible path.
 
     A list whose items do not all have different names can only be set as a whole.
     """
-    if isinstance(old, list) and isinstance(new, list) and _names(new) and _names(old) == _names(new):
+    if (
+        isinstance(old, list)
+        and isinstance(new, list)
+        and _names(new)
+        and _names(old) == _names(new)
+    ):
         old, new = (dict(zip(_names(items), items, strict=True)) for items in (old, new))
     if isinstance(old, Mapping) and isinstance(new, Mapping) and list(old) == list(new):
         for step in new:

@@ -1,4 +1,5 @@
-"""Executors like those of `concurrent.futures`: worker processes of this machine, or a dask cluster."""
+"""Executors like those of `concurrent.futures`: worker processes of this machine, or a dask
+cluster."""
 
 from __future__ import annotations
 
@@ -29,14 +30,17 @@ REPORT_WORKERS = min(4, cores())  # a worker of a report holds some 500 MB
 
 
 def executor(workers: int, dask: str = "") -> AbstractContextManager[Executor]:
-    """Return a context with an executor: `workers` processes, or the dask cluster whose scheduler is at `dask`.
+    """Return a context with an executor: `workers` processes, or the dask cluster whose scheduler
+    is at `dask`.
 
-    Only this process hears Ctrl-C. An exception inside the context ends the worker processes at once.
+    Only this process hears Ctrl-C. An exception inside the context ends the worker processes at
+    once.
 
     Raises
     ------
     IapbError
-        A worker process was killed, for example because memory ran out, or the cluster no longer answers.
+        A worker process was killed, for example because memory ran out, or the cluster no longer
+        answers.
     MissingDependencyError
         dask.distributed is not installed (extra ``cluster``).
     ArgumentError
@@ -49,9 +53,9 @@ def executor(workers: int, dask: str = "") -> AbstractContextManager[Executor]:
 def _without_ctrl_c() -> Iterator[None]:
     """Block SIGINT permanently in every process that is started inside this context.
 
-    A child inherits the signals that its parent's thread has blocked. If the child blocked SIGINT only after its
-    start, Ctrl-C could stop it during its imports: it would print a traceback, and if it held the lock of the pool,
-    the pool would wait forever.
+    A child inherits the signals that its parent's thread has blocked. If the child blocked SIGINT
+    only after its start, Ctrl-C could stop it during its imports: it would print a traceback, and
+    if it held the lock of the pool, the pool would wait forever.
     """
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -67,7 +71,8 @@ class _Processes(ProcessPoolExecutor):
 
 
 def _begin(told: Any) -> None:
-    """Initialise a worker. It ends with its parent, also a killed one; the first one that compiles says so."""
+    """Initialise a worker. It ends with its parent, also a killed one; the first one that compiles
+    says so."""
 
     def watch() -> None:
         parent: Any = parent_process()
@@ -88,7 +93,8 @@ def _processes(workers: int) -> Iterator[Executor]:
         yield pool
     except BrokenProcessPool as error:
         raise IapbError(
-            "a worker process was killed, probably because memory ran out; finished files are kept. "
+            "a worker process was killed, probably because memory ran out; finished files are "
+            "kept. "
             "Run the same command again with fewer --workers"
         ) from error
     except BaseException:

@@ -21,7 +21,8 @@ def nodes_in(source: str) -> int:
 
 
 def count_nodes() -> Counter[str]:
-    """Return the nodes of all tracked Python files by package; files at the top level count as "top level"."""
+    """Return the nodes of all tracked Python files by package; files at the top level count as "top
+    level"."""
     listed = subprocess.run(
         ["git", "ls-files", "-z", "*.py"], cwd=ROOT, capture_output=True, text=True, check=True
     ).stdout
@@ -35,7 +36,8 @@ def count_nodes() -> Counter[str]:
 
 
 def main() -> int:
-    """Print the nodes of each package beside its budget; return 1 if a package is over it or has none."""
+    """Print the nodes of each package beside its budget; return 1 if a package is over it or has
+    none."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     budget = project["tool"]["nodes"]
     over = False

@@ -1,4 +1,5 @@
-"""Evidence: proofs, physical laws, hard cases, accuracy against time, claims. Studies return records, not files.
+"""Evidence: proofs, physical laws, hard cases, accuracy against time, claims. Studies return
+records, not files.
 
 Each name below is loaded at its first use, so ``import verification`` is fast.
 """

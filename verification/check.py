@@ -1,10 +1,13 @@
-"""Check: a question, the cases on which it is tested, and the rule that decides each row. Topic: a list of Checks.
+"""Check: a question, the cases on which it is tested, and the rule that decides each row. Topic: a
+list of Checks.
 
-Every study is one or more Checks. Its functions know only their case; the runner in this module knows failures,
-progress, depth and tables. No verdict is written by hand: it follows from the outcomes of the rows.
+Every study is one or more Checks. Its functions know only their case; the runner in this module
+knows failures, progress, depth and tables. No verdict is written by hand: it follows from the
+outcomes of the rows.
 
-    Check.finding(study)              a claim: each part is judged, a region is searched where a part is mixed
-    Topic(run, depth, progress)       a section of the report: each check gives a table and its sentences
+    Check.finding(study)              a claim: each part is judged, a region is searched where a
+    part is mixed Topic(run, depth, progress)       a section of the report: each check gives a
+    table and its sentences
 """
 
 from __future__ import annotations
@@ -43,7 +46,8 @@ SEED = 20050601  # of random impacts and conditions: the month in which the pape
 
 @dataclass
 class Study:
-    """What the functions of a check get: runs, the depth, the seed, and results that several checks share.
+    """What the functions of a check get: runs, the depth, the seed, and results that several checks
+    share.
 
     run : (scene, world, rendering) -> Run, made now or read from a store
     depth : "quick" or "full"; "full" has more cases
@@ -69,15 +73,19 @@ class Study:
         return cast(Result, self.results[key])
 
     def table(self, check: Check) -> Table:
-        """Return the table of a check, which is made only once; another check may show what follows from it."""
+        """Return the table of a check, which is made only once; another check may show what follows
+        from it."""
         return self.once(("table", check.key), lambda: check.table(self))
 
     def scene(self, name: str) -> Scene:
         """Return a scene of the project by name."""
         return self.once(("scene", name), lambda: load_scene(find_scene(name)))
 
-    def each(self, cases: Iterable[Case], results: Callable[[Case], Iterable[Result]]) -> Iterator[Result]:
-        """Yield the results of each case; a case that raises is added to `failures` if that list is given."""
+    def each(
+        self, cases: Iterable[Case], results: Callable[[Case], Iterable[Result]]
+    ) -> Iterator[Result]:
+        """Yield the results of each case; a case that raises is added to `failures` if that list is
+        given."""
         return of_each(cases, results, self.failures)
 
 
@@ -89,22 +97,31 @@ class Check:
     ----------
     key : name of the check and of its table; question : what is claimed or asked, in one sentence
     cases : study -> the cases to test
-    row : (study, case) -> the row of a case, or several rows. The keys of a row carry the unit, such as "error [m]";
-        they are the columns of the table, in the order of their first appearance
-    holds : one row -> True, False, or None if the row cannot decide; a pure function of the row, whose keys here lack
-        the unit. Without it a row may have the key "holds"; without either, nothing is judged
-    says : judged table -> the result in words with numbers. A topic may also return one or more Parts; a Part with an
-        empty verdict gets that of the table. By default the question with the number of rows that hold
+    row : (study, case) -> the row of a case, or several rows. The keys of a row carry the unit,
+        such as "error [m]"; they are the columns of the table, in the order of their first
+        appearance
+    holds : one row -> True, False, or None if the row cannot decide; a pure function of the row,
+        whose keys here lack the unit. Without it a row may have the key "holds"; without either,
+        nothing is judged
+    says : judged table -> the result in words with numbers. A topic may also return one or more
+        Parts; a Part with an empty verdict gets that of the table. By default the question with the
+        number of rows that hold
     spans : keys of the columns whose smallest and largest value the default sentence gives
-    conditions, parts, counts, timed, prose : keys of the columns that are conditions, that split the rows into parts,
-        that count the cases of a row, that depend on measured times, and that are sentences (see `Column`)
-    roles : MISPRINT or BEYOND for each part, or value of a column of `parts`, that is not the statement of the question
-    named : the words for a part, or value of a column of `parts`, in an outcome such as "fails in rotation"
+    conditions, parts, counts, timed, prose : keys of the columns that are conditions, that split
+        the rows into parts, that count the cases of a row, that depend on measured times, and that
+        are sentences (see `Column`)
+    roles : MISPRINT or BEYOND for each part, or value of a column of `parts`, that is not the
+        statement of the question
+    named : the words for a part, or value of a column of `parts`, in an outcome such as "fails in
+        rotation"
     untested : what the paper states and no case tests; each is a part that cannot tell
-    draw : (study, region) -> fresh cases inside a region, which confirm it; None if there are no fresh cases
+    draw : (study, region) -> fresh cases inside a region, which confirm it; None if there are no
+        fresh cases
     prepare : (study, cases), called before the first row, for example to compute on several cores
-    rule : the outcomes of all rows -> the verdict of a topic's sentence; by default one failure refutes
-    place, quantity, tolerance : where the paper says it, what is measured, and the limit with its reason
+    rule : the outcomes of all rows -> the verdict of a topic's sentence; by default one failure
+        refutes
+    place, quantity, tolerance : where the paper says it, what is measured, and the limit with its
+        reason
     note : text printed below the table; digits : significant digits in print
     axes : columns of the plotted maps: horizontal, vertical, and those that split the maps
     timed_rows : True if the selection of rows depends on measured times
@@ -151,23 +168,36 @@ class Check:
     def table_of(self, rows: Iterable[Row]) -> Table:
         """Return the judged table of these rows; a row without a value has None in its place."""
         given = list(rows)
-        table = table_from(given, self.digits, self.note, self.timed_rows, condition=self.conditions, part=self.parts,
-                           cases=self.counts, timed=self.timed, prose=self.prose)
+        table = table_from(
+            given,
+            self.digits,
+            self.note,
+            self.timed_rows,
+            condition=self.conditions,
+            part=self.parts,
+            cases=self.counts,
+            timed=self.timed,
+            prose=self.prose,
+        )
         if self.holds is not None:
             return table.judged(self.holds)
         known = any(HOLDS in row for row in given)
         return replace(table, holds=tuple(row.get(HOLDS) for row in given)) if known else table
 
     def finding(self, study: Study) -> Finding:
-        """Measure and judge all rows and return the finding on a claim; fresh cases confirm its regions."""
+        """Measure and judge all rows and return the finding on a claim; fresh cases confirm its
+        regions."""
         return self.conclude(self.table(study), study)
 
     def conclude(self, table: Table, study: Study | None = None) -> Finding:
-        """Return the finding on a claim from its judged table; without a study it draws no fresh cases."""
+        """Return the finding on a claim from its judged table; without a study it draws no fresh
+        cases."""
         parts = [Part("No trial tests it.", NOT_TESTABLE, name) for name in self.untested]
         for name, rows in by_part(table).items():
             role = _of_part(self.roles, name)
-            judged = judge_part(name, rows, None if role else self._fresh(study, name))  # a role decides nothing
+            judged = judge_part(
+                name, rows, None if role else self._fresh(study, name)
+            )  # a role decides nothing
             parts.append(replace(judged, role=role, named=_of_part(self.named, name)))
         return self._found(str(self.says(table)) if self.says else "", parts, table)
 
@@ -194,26 +224,39 @@ class Check:
         return drawn
 
     def sentences(self, table: Table) -> tuple[Part, ...]:
-        """Return what a topic says of the judged table; nothing if the table is neither judged nor told."""
+        """Return what a topic says of the judged table; nothing if the table is neither judged nor
+        told."""
         if self.says is None:
             if self.holds is None and not table.holds:
                 return ()
             told = table.only(held is not None for held in table.holds)
             more = len(table.rows) - len(told.rows)
-            held = (f"{sum(told.decided)} of {len(told.rows)} rows of the table hold"
-                    f"{f'; {more} more cannot tell' * bool(more)}.{_spans(told, self.spans)}")
-            said: Said = Part(f"{self.question} {held}", "", timed=any(column.timed for column in table.columns),
-                              asked=self.question, measured=held, target="every row")  # fmt: skip
+            held = (
+                f"{sum(told.decided)} of {len(told.rows)} rows of the table hold"
+                f"{f'; {more} more cannot tell' * bool(more)}.{_spans(told, self.spans)}"
+            )
+            said: Said = Part(
+                f"{self.question} {held}",
+                "",
+                timed=any(column.timed for column in table.columns),
+                asked=self.question,
+                measured=held,
+                target="every row",
+            )
         else:
             said = self.says(table)
         if isinstance(said, str):
             said = Part(said, "", timed=any(column.timed for column in table.columns))
         given = (said,) if isinstance(said, Part) else tuple(said)
-        return tuple(part if part.verdict else replace(part, verdict=self.rule(table.holds)) for part in given)
+        return tuple(
+            part if part.verdict else replace(part, verdict=self.rule(table.holds))
+            for part in given
+        )
 
 
 def _of_part(words: Mapping[str, str], name: str) -> str:
-    """Return the word for a part, whose name is the values of its columns with commas between them; "" if none."""
+    """Return the word for a part, whose name is the values of its columns with commas between them;
+    "" if none."""
     return next((word for value, word in words.items() if f", {value}, " in f", {name}, "), "")
 
 
@@ -221,8 +264,11 @@ def _spans(table: Table, keys: Iterable[str]) -> str:
     """Return the smallest and largest value of each column in words, with its unit."""
     titles = {column.key: column.title for column in table.columns}
     found = {titles[key]: [value for value in table[key] if value is not None] for key in keys}
-    return "".join(f" {key[:1].upper()}{key[1:]}: {_short(min(values))} to {_short(max(values))}."
-                   for key, values in found.items() if values)  # fmt: skip
+    return "".join(
+        f" {key[:1].upper()}{key[1:]}: {_short(min(values))} to {_short(max(values))}."
+        for key, values in found.items()
+        if values
+    )
 
 
 def _short(value: float) -> str:
@@ -244,22 +290,37 @@ class Topic:
     says: Callable[[Mapping[str, Table], Sequence[Part]], str]
 
     def __call__(
-        self, run: Callable[..., Run], depth: str, progress: Callable[[int, int], None],
+        self,
+        run: Callable[..., Run],
+        depth: str,
+        progress: Callable[[int, int], None],
         known: Mapping[str, Table] | None = None,
-    ) -> Finding:  # fmt: skip
-        """Run every check and return the finding. A check that raises leaves no table; the finding names it.
+    ) -> Finding:
+        """Run every check and return the finding. A check that raises leaves no table; the finding
+        names it.
 
         known : tables that `measure` has made, by key of the check
         """
         failures: list[Failure] = []
-        return self.conclude(self.measure(self.checks, run, depth, progress, failures, known or {}), failures)
+        return self.conclude(
+            self.measure(self.checks, run, depth, progress, failures, known or {}), failures
+        )
 
     def measure(
-        self, checks: Sequence[Check], run: Callable[..., Run], depth: str, progress: Callable[[int, int], None],
-        failures: list[Failure], known: Mapping[str, Table] = MappingProxyType({}),
-    ) -> dict[str, Table]:  # fmt: skip
-        """Return the tables of some of the checks by key; the cases that raise are added to `failures`."""
-        study, tables = Study(run, depth, results={("table", key): table for key, table in known.items()}), {}
+        self,
+        checks: Sequence[Check],
+        run: Callable[..., Run],
+        depth: str,
+        progress: Callable[[int, int], None],
+        failures: list[Failure],
+        known: Mapping[str, Table] = MappingProxyType({}),
+    ) -> dict[str, Table]:
+        """Return the tables of some of the checks by key; the cases that raise are added to
+        `failures`."""
+        study, tables = (
+            Study(run, depth, results={("table", key): table for key, table in known.items()}),
+            {},
+        )
         for done, check in enumerate(checks):
             progress(done, len(checks))
             study.failures = []
@@ -271,9 +332,13 @@ class Topic:
         return tables
 
     def conclude(
-        self, tables: Mapping[str, Table], failures: Sequence[Failure] = (), given: Iterable[Part] = ()
+        self,
+        tables: Mapping[str, Table],
+        failures: Sequence[Failure] = (),
+        given: Iterable[Part] = (),
     ) -> Finding:
-        """Return the finding of tables by key of the check, with `given` parts after those of the checks."""
+        """Return the finding of tables by key of the check, with `given` parts after those of the
+        checks."""
         lost, parts = list[Failure](), list[Part]()
         for check in self.checks:
             if check.key in tables:
@@ -282,5 +347,12 @@ class Topic:
         parts += given
         answer = attempt("the answer", partial(self.says, tables, parts), lost) or ""
         known = {one.case for one in failures}
-        return finding_of(self.key, self.title, self.question, answer, parts, tables,
-                          [*failures, *(one for one in lost if one.case not in known)])
+        return finding_of(
+            self.key,
+            self.title,
+            self.question,
+            answer,
+            parts,
+            tables,
+            [*failures, *(one for one in lost if one.case not in known)],
+        )

@@ -1,9 +1,11 @@
-"""Timing for all studies: a warm-up call before each sample, contestants in random order, CPU time of this thread.
+"""Timing for all studies: a warm-up call before each sample, contestants in random order, CPU time
+of this thread.
 
-The CPU time of a thread excludes other processes. However, other processes and the previous contestant replace the
-contents of the caches. Every round therefore calls all contestants in a new random order, and linear algebra runs on
-one thread. Ratios compare samples of the same run. Compiled code is timed within compiled code: if a call has a method
-`repeated(times)`, that method runs the loop, so the overhead of calls from Python is excluded.
+The CPU time of a thread excludes other processes. However, other processes and the previous
+contestant replace the contents of the caches. Every round therefore calls all contestants in a new
+random order, and linear algebra runs on one thread. Ratios compare samples of the same run.
+Compiled code is timed within compiled code: if a call has a method `repeated(times)`, that method
+runs the loop, so the overhead of calls from Python is excluded.
 """
 
 from __future__ import annotations
@@ -23,13 +25,16 @@ Result = TypeVar("Result")
 Call = Callable[[], object]
 
 LEAST_ROUNDS = 3  # for slow contestants, too
-_SHORTEST_SAMPLE = 1e-3  # seconds: faster calls are repeated within a sample, the clock resolves 1e-7
+_SHORTEST_SAMPLE = (
+    1e-3  # seconds: faster calls are repeated within a sample, the clock resolves 1e-7
+)
 _WARMED = 2e-2  # seconds: cold caches hardly affect longer samples, so those get no warm-up call
 
 
 @dataclass(frozen=True)
 class Times:
-    """Seconds per call of one contestant, one sample per round. Without samples every statistic is NaN."""
+    """Seconds per call of one contestant, one sample per round. Without samples every statistic is
+    NaN."""
 
     samples: tuple[float, ...] = ()
 
@@ -69,7 +74,9 @@ class Times:
 
     def over(self, other: Times) -> Times:
         """Return the ratio of these samples to those of another contestant, round by round."""
-        return Times(tuple(ours / theirs for ours, theirs in zip(self.samples, other.samples, strict=True)))
+        return Times(
+            tuple(ours / theirs for ours, theirs in zip(self.samples, other.samples, strict=True))
+        )
 
 
 TIMES = ("time", "lower quartile", "upper quartile")  # the columns of `time_cells`
@@ -81,20 +88,41 @@ def time_cells(times: Times) -> dict[str, float]:
     return {f"{name} [µs]": 1e6 * value for name, value in zip(TIMES, values, strict=True)}
 
 
-def target(asked: str, measured: str, wanted: str, met: bool, miss: str = "", *, timed: bool = True) -> Part:
+def target(
+    asked: str, measured: str, wanted: str, met: bool, miss: str = "", *, timed: bool = True
+) -> Part:
     """Return a part on a target; `miss` is the text for the first page if the target is missed."""
-    return Part.of(asked, measured, wanted, REPRODUCED if met else MIXED, timed=timed, miss="" if met else miss)
+    return Part.of(
+        asked, measured, wanted, REPRODUCED if met else MIXED, timed=timed, miss="" if met else miss
+    )
 
 
 def limited(
-    what: str, value: float, limit: float, unit: str = "", more: str = "", *, least: bool = False, timed: bool = True,
+    what: str,
+    value: float,
+    limit: float,
+    unit: str = "",
+    more: str = "",
+    *,
+    least: bool = False,
+    timed: bool = True,
 ) -> Part:
-    """Return a part on a value that should be at most (`least`: at least) the limit; `what` begins its sentence."""
+    """Return a part on a value that should be at most (`least`: at least) the limit; `what` begins
+    its sentence."""
     told, met = f"{what} {value:.3g}{unit}", value >= limit if least else value <= limit
-    wanted, asked = f"at {'least' if least else 'most'} {limit:g}{unit}", f"{what[0].upper()}{what[1:]}"
-    return Part(f"{asked} {value:.3g}{unit}{more}. Target: {wanted}.", REPRODUCED if met else MIXED, timed=timed,
-                miss="" if met else f"{told} (our own target: {wanted.removesuffix(unit)})",
-                asked=asked, measured=f"{value:.3g}{unit}{more}", target=wanted)  # fmt: skip
+    wanted, asked = (
+        f"at {'least' if least else 'most'} {limit:g}{unit}",
+        f"{what[0].upper()}{what[1:]}",
+    )
+    return Part(
+        f"{asked} {value:.3g}{unit}{more}. Target: {wanted}.",
+        REPRODUCED if met else MIXED,
+        timed=timed,
+        miss="" if met else f"{told} (our own target: {wanted.removesuffix(unit)})",
+        asked=asked,
+        measured=f"{value:.3g}{unit}{more}",
+        target=wanted,
+    )
 
 
 def timed(work: Callable[[], Result]) -> tuple[Result, float]:
@@ -119,9 +147,9 @@ def seconds(call: Call, times: int = 1) -> float:
 def sampler(call: Call) -> Callable[[], float]:
     """Return a contestant for `take_turns`. One sample repeats `call` until the clock resolves it.
 
-    The same number of warm-up calls precedes each sample of less than 0.02 s: after another contestant has run, the
-    caches need many calls to fill. The first call of all does not count when the number of calls is chosen, because it
-    loads machine code.
+    The same number of warm-up calls precedes each sample of less than 0.02 s: after another
+    contestant has run, the caches need many calls to fill. The first call of all does not count
+    when the number of calls is chosen, because it loads machine code.
     """
     call()
     times = 1
@@ -137,18 +165,25 @@ def sampler(call: Call) -> Callable[[], float]:
 
 
 def take_turns(
-    contestants: Mapping[Key, Callable[[], float]], rounds: int, *, warm: bool = True, enough: float = np.inf,
-    failures: list[Failure] | None = None, name: Callable[[Key], str] = str,
+    contestants: Mapping[Key, Callable[[], float]],
+    rounds: int,
+    *,
+    warm: bool = True,
+    enough: float = np.inf,
+    failures: list[Failure] | None = None,
+    name: Callable[[Key], str] = str,
 ) -> dict[Key, Times]:
     """Sample every contestant once per round, in a new random order each round.
 
     Parameters
     ----------
-    contestants : functions that return the seconds of one sample, such as `sampler(call)` or a function that does its
-        setup before it starts the clock
+    contestants : functions that return the seconds of one sample, such as `sampler(call)` or a
+        function that does its setup before it starts the clock
     warm : whether one uncounted round goes first; False if all contestants have just run
-    enough : a contestant stops after LEAST_ROUNDS rounds once its samples add up to more than this [s]
-    failures : receives a Failure for each contestant that raises; the result leaves these contestants out
+    enough : a contestant stops after LEAST_ROUNDS rounds once its samples add up to more than this
+        [s]
+    failures : receives a Failure for each contestant that raises; the result leaves these
+        contestants out
     name : returns the name of a contestant for its Failure
     """
     found: dict[Key, list[float]] = {key: [] for key in contestants}

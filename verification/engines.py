@@ -1,7 +1,8 @@
 """Topic "engines": the project's scenes in MuJoCo and in IAPB, beside rigid contact.
 
-Every scene keeps its bodies, walls, friction and restitution. It gets the default contact, and the hand holds the tool
-itself: what MuJoCo has nothing like is left out, so that all worlds simulate the same scene.
+Every scene keeps its bodies, walls, friction and restitution. It gets the default contact, and the
+hand holds the tool itself: what MuJoCo has nothing like is left out, so that all worlds simulate
+the same scene.
 """
 
 from __future__ import annotations
@@ -51,7 +52,8 @@ def _answer(tables: Mapping[str, Table], parts: Sequence[Part]) -> str:
         return f"MuJoCo is not installed: {installing('reference')}."
     medians = [float(np.median(table.column(f"{name} apart"))) for name in ("IAPB", "MuJoCo")]
     return (
-        f"In the median of {len(table.rows)} scenes IAPB is {medians[0]:.2g} mm from rigid contact, and MuJoCo "
+        f"In the median of {len(table.rows)} scenes IAPB is {medians[0]:.2g} mm from rigid "
+        f"contact, and MuJoCo "
         f"{medians[1]:.2g} mm."
     )
 
@@ -65,14 +67,16 @@ SCENES = Check(
     rule=verdict_of_trials,
     digits=3,
     note="Apart: distance from the ideal world, in a scene with friction from ideal-friction; root mean square over "
-    "mass and time. Above start and work: the largest rise of kinetic plus potential energy above the start and the "
+    "mass and time. Above start and work: the largest rise of kinetic plus potential energy above "
+    "the start and the "
     "work of the hand.",
 )
 engines = Topic(
     key="engines",
     title="Other engines",
     question="Every scene of the project is simulated in IAPB, in MuJoCo and with rigid contact, at the scene's own "
-    "step. The scenes have the default contact, and the hand holds the tool itself, so that all worlds simulate the "
+    "step. The scenes have the default contact, and the hand holds the tool itself, so that all "
+    "worlds simulate the "
     "same. MuJoCo's settings follow from one rule (docs/engines.md).",
     checks=(SCENES,),
     says=_answer,

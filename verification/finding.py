@@ -1,8 +1,8 @@
 """Finding: the record that every study returns and that reports store and print.
 
-A Finding answers a question by a sentence with a number, a verdict, the parts that were judged, and the tables with
-the data. If a case raises an exception, `attempt` records a Failure, the table lacks that row, and the study goes on.
-This module is independent of pages and files.
+A Finding answers a question by a sentence with a number, a verdict, the parts that were judged, and
+the tables with the data. If a case raises an exception, `attempt` records a Failure, the table
+lacks that row, and the study goes on. This module is independent of pages and files.
 """
 
 from __future__ import annotations
@@ -20,22 +20,52 @@ from verification.table import Table, ranges, titled
 Case = TypeVar("Case")
 Result = TypeVar("Result")
 
-# WHERE: the claim holds in every trial inside `Part.region`. MIXED: it holds in some trials; no region is confirmed.
+# WHERE: the claim holds in every trial inside `Part.region`. MIXED: it holds in some trials; no
+# region is confirmed.
 REPRODUCED, WHERE, MIXED, REFUTED, NOT_TESTABLE, NOT_COMPUTED = VERDICTS = (
-    "reproduced", "reproduced where", "mixed", "refuted", "not testable here", "not computed in this run",
-)  # fmt: skip
-# A claim without a confirmed range that fails in more trials than it holds in is refuted, not "true with exceptions".
+    "reproduced",
+    "reproduced where",
+    "mixed",
+    "refuted",
+    "not testable here",
+    "not computed in this run",
+)
+# A claim without a confirmed range that fails in more trials than it holds in is refuted, not "true
+# with exceptions".
 LEAST_SHARE = 0.5
-# A part of a claim is the paper's statement (""), a formula as printed whose failure is an erratum, or ours, beyond the
-# paper. Only the paper's statement decides the claim.
+# A part of a claim is the paper's statement (""), a formula as printed whose failure is an erratum,
+# or ours, beyond the paper. Only the paper's statement decides the claim.
 MISPRINT, BEYOND = "misprint", "beyond"
-# The verdicts in words, and what a claim comes to: those of its statement, and three that name what is wrong with it.
-IN_WORDS = dict(zip(VERDICTS, ("holds", "holds where stated", "holds in some trials", "fails", "cannot tell",
-                               "not computed"), strict=True))  # fmt: skip
+# The verdicts in words, and what a claim comes to: those of its statement, and three that name what
+# is wrong with it.
+IN_WORDS = dict(
+    zip(
+        VERDICTS,
+        (
+            "holds",
+            "holds where stated",
+            "holds in some trials",
+            "fails",
+            "cannot tell",
+            "not computed",
+        ),
+        strict=True,
+    )
+)
 HOLDS, FAILS = IN_WORDS[REPRODUCED], IN_WORDS[REFUTED]
 MISPRINTED, FAILS_IN = f"{HOLDS}, {MISPRINT}", f"{FAILS} in a named quantity"
-KINDS = (HOLDS, MISPRINTED, IN_WORDS[WHERE], FAILS_IN, FAILS, IN_WORDS[NOT_TESTABLE], IN_WORDS[NOT_COMPUTED])
-LEAST_DECIDED = 10  # least number of trials that reproduce a part; for the reason see LEAST_CONFIRMING
+KINDS = (
+    HOLDS,
+    MISPRINTED,
+    IN_WORDS[WHERE],
+    FAILS_IN,
+    FAILS,
+    IN_WORDS[NOT_TESTABLE],
+    IN_WORDS[NOT_COMPUTED],
+)
+LEAST_DECIDED = (
+    10  # least number of trials that reproduce a part; for the reason see LEAST_CONFIRMING
+)
 # A finding is reproduced only if every part is decided.
 WORST_FIRST = (REFUTED, MIXED, NOT_COMPUTED, NOT_TESTABLE, WHERE, REPRODUCED)
 DEPTHS = ("quick", "full")
@@ -47,13 +77,17 @@ class Part:
     """A part of the answer, judged separately.
 
     name : distinguishes the parts of one question; sentence : the result, with its number
-    held, decided : trials in which the claim held, and trials that had an outcome; unknown : trials without one
+    held, decided : trials in which the claim held, and trials that had an outcome; unknown : trials
+        without one
     cases : number of cases in the decided trials, if it is below LEAST_DECIDED
-    region : region in which the part is reproduced, if the verdict is WHERE; fails : conditions of the failed trials
+    region : region in which the part is reproduced, if the verdict is WHERE; fails : conditions of
+        the failed trials
     timed : True if measured times enter
-    optional : True if the part needs software that the project does not include; the other parts decide without it
+    optional : True if the part needs software that the project does not include; the other parts
+        decide without it
     miss : one short clause for the first page that says where our method falls short; otherwise ""
-    role : "" for the statement of the question, MISPRINT or BEYOND for what is shown beside it and never decides
+    role : "" for the statement of the question, MISPRINT or BEYOND for what is shown beside it and
+        never decides
     named : the quantity in words, for "fails in ..."; by default the name
     asked, measured, target : the part as a row of a table, if it has them
     """
@@ -77,16 +111,31 @@ class Part:
     target: str = ""
 
     @classmethod
-    def of(cls, asked: str, measured: str, target: str, verdict: str, name: str = "", **more: Any) -> Part:
+    def of(
+        cls, asked: str, measured: str, target: str, verdict: str, name: str = "", **more: Any
+    ) -> Part:
         """Return a part from what is asked, measured and wanted; its sentence says all three."""
-        return cls(f"{asked}: {measured}. Target: {target}.", verdict, name, asked=asked, measured=measured,
-                   target=target, **more)  # fmt: skip
+        return cls(
+            f"{asked}: {measured}. Target: {target}.",
+            verdict,
+            name,
+            asked=asked,
+            measured=measured,
+            target=target,
+            **more,
+        )
 
     @property
     def outcome(self) -> str:
         """The verdict in words, with the role and the region if there is one."""
         said = f"{HOLDS} where {self.region}" if self.region else IN_WORDS[self.verdict]
-        return f"{said}, as printed" if self.role == MISPRINT else f"{said} (beyond the paper)" if self.role else said
+        return (
+            f"{said}, as printed"
+            if self.role == MISPRINT
+            else f"{said} (beyond the paper)"
+            if self.role
+            else said
+        )
 
 
 @dataclass(frozen=True)
@@ -113,7 +162,8 @@ class Finding:
     verdict : one of VERDICTS; parts : the parts that give the verdict
     tables : the data, by name; a figure refers to a table as "<key>/<name>"
     details : further information by label (place, tolerance, source, law ...)
-    axes : keys of the columns for a map of the outcome: horizontal axis, vertical axis, and one map per value
+    axes : keys of the columns for a map of the outcome: horizontal axis, vertical axis, and one map
+        per value
     failures : the cases that raised an exception; the tables lack their rows
     timed : True if the verdict or the answer depends on measured times
     """
@@ -132,10 +182,13 @@ class Finding:
 
     @property
     def outcome(self) -> str:
-        """What a claim comes to, in words; it follows from the parts that are the statement of the question."""
+        """What a claim comes to, in words; it follows from the parts that are the statement of the
+        question."""
         stated = [part for part in self.parts if not part.role]
-        refuted, mixed = ([part.named or part.name for part in stated if part.verdict == verdict]
-                          for verdict in (REFUTED, MIXED))  # fmt: skip
+        refuted, mixed = (
+            [part.named or part.name for part in stated if part.verdict == verdict]
+            for verdict in (REFUTED, MIXED)
+        )
         judged = sum(part.verdict != NOT_COMPUTED for part in stated)
         if judged and judged in (len(refuted), len(mixed)):
             return FAILS if refuted else f"{FAILS} in some trials"
@@ -165,7 +218,9 @@ class Finding:
 def _listed(before: str, names: Iterable[str]) -> str:
     """Return the names, each once, after a word: "in a, b and c"; "" without names."""
     *others, last = dict.fromkeys(names) or [""]
-    return f"{before} {', '.join(others)} and {last}" if others else f"{before} {last}" if last else ""
+    return (
+        f"{before} {', '.join(others)} and {last}" if others else f"{before} {last}" if last else ""
+    )
 
 
 def check_depth(depth: str) -> None:
@@ -182,9 +237,10 @@ def worst(verdicts: Iterable[str]) -> str:
 def verdict_of_trials(holds: Iterable[bool | None]) -> str:
     """Return the verdict on a claim from the outcomes of many trials.
 
-    Only trials with an outcome count. The claim is reproduced if it holds in all of them, mixed if it holds in at least
-    the share LEAST_SHARE, refuted if it holds in fewer, and not testable here if no trial has an outcome. The verdict
-    "reproduced where" needs a confirmed region: see `judge_part`.
+    Only trials with an outcome count. The claim is reproduced if it holds in all of them, mixed if
+    it holds in at least the share LEAST_SHARE, refuted if it holds in fewer, and not testable here
+    if no trial has an outcome. The verdict "reproduced where" needs a confirmed region: see
+    `judge_part`.
     """
     decided = [outcome for outcome in holds if outcome is not None]
     return verdict_of_share(sum(decided) / len(decided)) if decided else NOT_TESTABLE
@@ -204,28 +260,42 @@ def verdict_of_law(holds: Iterable[bool | None]) -> str:
 def judge_part(name: str, trials: Table, fresh: Callable[[Region], Table] | None = None) -> Part:
     """Return the verdict on the trials of one part.
 
-    A part that fails becomes "reproduced where" if a region is confirmed. A region is sought if the part is mixed or
-    holds in LEAST_DECIDED trials, since its share of the trials depends on which conditions were chosen. The region is
-    found on one half of the trials; the claim must hold in all trials of the other half that lie inside the region, and
-    in all that `fresh` draws inside. At least LEAST_CONFIRMING trials must confirm the region: fresh trials if they can
-    be drawn, else those of the other half. If all trials hold but fewer than LEAST_DECIDED cases have an outcome, the
-    part is not testable here. A part with failures is mixed or refuted, however few trials there are.
+    A part that fails becomes "reproduced where" if a region is confirmed. A region is sought if the
+    part is mixed or holds in LEAST_DECIDED trials, since its share of the trials depends on which
+    conditions were chosen. The region is found on one half of the trials; the claim must hold in
+    all trials of the other half that lie inside the region, and in all that `fresh` draws inside.
+    At least LEAST_CONFIRMING trials must confirm the region: fresh trials if they can be drawn,
+    else those of the other half. If all trials hold but fewer than LEAST_DECIDED cases have an
+    outcome, the part is not testable here. A part with failures is mixed or refuted, however few
+    trials there are.
     """
     verdict, timed = verdict_of_trials(trials.holds), any(column.timed for column in trials.columns)
     held, decided, total = trials.holds.count(True), len(trials.decided), len(trials.rows)
     said = f"holds in {held} of {decided} trials" if decided else "no trial can tell"
     if 0 < decided < total:
         said = f"{said}; {total - decided} more cannot tell"
-    part = Part("", verdict, name, held, decided, total - decided, None, _where_it_fails(trials), timed)
+    part = Part(
+        "", verdict, name, held, decided, total - decided, None, _where_it_fails(trials), timed
+    )
     if verdict == MIXED or (verdict == REFUTED and held >= LEAST_DECIDED):
         region, tried = confirmed(trials, fresh)
         most = "fails in most trials; " if verdict == REFUTED else ""
-        part, said = replace(part, region=region, verdict=WHERE if region else verdict), f"{said}; {most}{tried}"
+        part, said = (
+            replace(part, region=region, verdict=WHERE if region else verdict),
+            f"{said}; {most}{tried}",
+        )
     judged = trials.only(held is not None for held in trials.holds)
-    counts = [sum(count or 0 for count in judged.column(column.key)) for column in trials.columns if column.cases]
+    counts = [
+        sum(count or 0 for count in judged.column(column.key))
+        for column in trials.columns
+        if column.cases
+    ]
     cases = max(decided, *counts, 0)
     if decided < LEAST_DECIDED <= cases:
-        part, said = replace(part, cases=cases), f"{said} ({cases} cases in the trials that can tell)"
+        part, said = (
+            replace(part, cases=cases),
+            f"{said} ({cases} cases in the trials that can tell)",
+        )
     elif 0 < cases < LEAST_DECIDED and part.verdict != WHERE:
         part = replace(part, verdict=NOT_TESTABLE if part.verdict == REPRODUCED else part.verdict)
         said = f"{said}; fewer than {LEAST_DECIDED} trials can tell"
@@ -245,7 +315,8 @@ def _where_it_fails(trials: Table) -> str:
 def verdict_of(parts: Iterable[Part]) -> str:
     """Return the verdict of a finding: that of its worst part.
 
-    A part with a role never counts. An optional part without any decided trial counts only if there is no other part.
+    A part with a role never counts. An optional part without any decided trial counts only if there
+    is no other part.
     """
     given = [part for part in parts if not part.role]
     absent = [part.optional and part.verdict == NOT_TESTABLE and not part.decided for part in given]
@@ -254,28 +325,45 @@ def verdict_of(parts: Iterable[Part]) -> str:
 
 
 def with_failures(finding: Finding, failures: Sequence[Failure]) -> Finding:
-    """Return the finding with failed cases: this adds a part, a table of the reasons, and a clause in the answer."""
+    """Return the finding with failed cases: this adds a part, a table of the reasons, and a clause
+    in the answer."""
     if not failures:
         return finding
     every, count = (*finding.failures, *failures), len(failures)
     said = "One case failed and is" if count == 1 else f"{count} cases failed and are"
-    part = Part(f"{said} in no other number: {', '.join(failure.case for failure in failures)}.", NOT_COMPUTED)
-    table = titled(("case", "error", "reason"), [(one.case, one.error, one.reason) for one in every])
+    part = Part(
+        f"{said} in no other number: {', '.join(failure.case for failure in failures)}.",
+        NOT_COMPUTED,
+    )
+    table = titled(
+        ("case", "error", "reason"), [(one.case, one.error, one.reason) for one in every]
+    )
     return replace(
-        finding, parts=(*finding.parts, part), tables={**finding.tables, FAILED_CASES: table}, failures=every,
+        finding,
+        parts=(*finding.parts, part),
+        tables={**finding.tables, FAILED_CASES: table},
+        failures=every,
         answer=f"{finding.answer} {count} {'case' if count == 1 else 'cases'} failed.".strip(),
         verdict=worst((finding.verdict, NOT_COMPUTED)),
-    )  # fmt: skip
+    )
 
 
 def finding_of(
-    key: str, title: str, question: str, answer: str, parts: Iterable[Part],
-    tables: Mapping[str, Table] | None = None, failures: Sequence[Failure] = (),
-) -> Finding:  # fmt: skip
-    """Return the finding made of `parts` and `failures`: it has the worst verdict, and is timed if any part is."""
+    key: str,
+    title: str,
+    question: str,
+    answer: str,
+    parts: Iterable[Part],
+    tables: Mapping[str, Table] | None = None,
+    failures: Sequence[Failure] = (),
+) -> Finding:
+    """Return the finding made of `parts` and `failures`: it has the worst verdict, and is timed if
+    any part is."""
     parts = tuple(parts)
     timed = any(part.timed for part in parts)
-    made = Finding(key, title, question, answer, verdict_of(parts), parts, tables or {}, timed=timed)
+    made = Finding(
+        key, title, question, answer, verdict_of(parts), parts, tables or {}, timed=timed
+    )
     return with_failures(made, failures)
 
 
@@ -285,7 +373,9 @@ def failure_of(case: str, error: Exception) -> Failure:
     return Failure(case, type(error).__name__, reason, "".join(traceback.format_exception(error)))
 
 
-def attempt(case: str, compute: Callable[[], Result], failures: list[Failure] | None) -> Result | None:
+def attempt(
+    case: str, compute: Callable[[], Result], failures: list[Failure] | None
+) -> Result | None:
     """Return compute(); if it raises an Exception, append a Failure to `failures` and return None.
 
     If `failures` is None, the exception propagates.
@@ -302,10 +392,13 @@ def attempt(case: str, compute: Callable[[], Result], failures: list[Failure] | 
 
 
 def of_each(
-    cases: Iterable[Case], results: Callable[[Case], Iterable[Result]], failures: list[Failure] | None,
+    cases: Iterable[Case],
+    results: Callable[[Case], Iterable[Result]],
+    failures: list[Failure] | None,
     name: Callable[[Case], str] | None = None,
 ) -> Iterator[Result]:
-    """Yield the results of each case; a case that raises an exception yields none and is recorded as a Failure."""
+    """Yield the results of each case; a case that raises an exception yields none and is recorded
+    as a Failure."""
     for case in cases:
         said = name(case) if name else _words(case)
         yield from attempt(said, lambda case=case: list(results(case)), failures) or ()  # type: ignore[misc]
@@ -324,4 +417,8 @@ def _words(case: Any) -> str:
     if not isinstance(case, tuple):
         return str(case)
     names = getattr(case, "_fields", ())
-    return ", ".join([f"{name} {part}" for name, part in zip(names, case, strict=True)] if names else map(_words, case))
+    return ", ".join(
+        [f"{name} {part}" for name, part in zip(names, case, strict=True)]
+        if names
+        else map(_words, case)
+    )

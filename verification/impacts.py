@@ -1,4 +1,5 @@
-"""ImpactCase, the type of one impact, and all generators of impacts. The same seed always gives the same impacts."""
+"""ImpactCase, the type of one impact, and all generators of impacts. The same seed always gives the
+same impacts."""
 
 from __future__ import annotations
 
@@ -24,8 +25,9 @@ def over(value: Floats, scale: Floats) -> Floats:
     return np.divide(value, scale, out=np.where(value > 0.0, np.inf, 0.0), where=scale > 0.0)
 
 
-# Singular values of the unit-scaled rows of A in this gap are neither clearly rounding nor clearly motion. A correct
-# resolver may treat them as either, so laws that compare velocities skip such impacts.
+# Singular values of the unit-scaled rows of A in this gap are neither clearly rounding nor clearly
+# motion. A correct resolver may treat them as either, so laws that compare velocities skip such
+# impacts.
 ROUNDING_BELOW, MOTION_ABOVE = 1e-13, 1e-5
 RANK_CUT = 1e-9  # anywhere in the gap
 INDEPENDENT = 1e-7  # ten times the motion that a resolver may leave in rows that it drops
@@ -41,9 +43,11 @@ class ImpactCase:
     translations : (k, d) motions z with J z = 0 exactly.
     unequal : (c,) restitutions, each in [0, 1], that replace e.
     touching : (k, d) rows of contacts that touch and do not approach.
-    tangents, friction : (c, m, d) rows of m tangents per contact, and (c,) Coulomb's μ; give both or neither.
+    tangents, friction : (c, m, d) rows of m tangents per contact, and (c,) Coulomb's μ; give both
+        or neither.
     rank : the first `rank` rows are independent; the others depend on them.
-    mass_condition, closeness : κ(M), and the distance between nearly dependent rows (1 = generic), as generated.
+    mass_condition, closeness : κ(M), and the distance between nearly dependent rows (1 = generic),
+        as generated.
     """
 
     mass_matrix: Floats
@@ -78,7 +82,11 @@ class ImpactCase:
     @property
     def redundancy(self) -> int:
         """Number of rows beyond the rank of J."""
-        return self.contacts - int(np.linalg.matrix_rank(self.contact_jacobian)) if self.contacts else 0
+        return (
+            self.contacts - int(np.linalg.matrix_rank(self.contact_jacobian))
+            if self.contacts
+            else 0
+        )
 
     @property
     def label(self) -> str:
@@ -95,7 +103,8 @@ class ImpactCase:
         return self.restitution if self.unequal is None else self.unequal.copy()
 
     def given(self) -> tuple[Any, ...]:
-        """Copies of the arguments for a resolver: M, J, v and e; with friction M, J, T, v, e and μ."""
+        """Copies of the arguments for a resolver: M, J, v and e; with friction M, J, T, v, e and
+        μ."""
         M, J, v = (array.copy() for array in self.arrays)
         e = self.given_restitution()
         if self.tangents is None or self.friction is None:
@@ -131,7 +140,8 @@ class ImpactCase:
 
     @cached_property
     def with_tangents(self) -> ImpactCase:
-        """The case with normals and tangents as its rows, not meant for resolvers; without friction the case itself."""
+        """The case with normals and tangents as its rows, not meant for resolvers; without friction
+        the case itself."""
         if self.tangents is None:
             return self
         rows = np.vstack([self.contact_jacobian, self.tangents.reshape(-1, self.coordinates)])
@@ -144,13 +154,15 @@ class ImpactCase:
 
     @cached_property
     def is_separated(self) -> bool:
-        """Whether no singular value of the unit rows lies between rounding and motion, so that the rank is certain."""
+        """Whether no singular value of the unit rows lies between rounding and motion, so that the
+        rank is certain."""
         values = self._svd[0]
         return not np.any((values > ROUNDING_BELOW) & (values < MOTION_ABOVE))
 
     @cached_property
     def is_independent(self) -> bool:
-        """Whether each row differs from every combination of the others by more than any resolver may neglect."""
+        """Whether each row differs from every combination of the others by more than any resolver
+        may neglect."""
         return self.contacts <= self.coordinates and bool(np.all(self._svd[0] > INDEPENDENT))
 
     @cached_property
@@ -182,30 +194,50 @@ class ImpactCase:
         return length / self.speed if self.speed > 0.0 else (0.0 if length == 0.0 else np.inf)
 
     def unmet_restitution(self, v_plus: Floats) -> float:
-        """max |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|); zero rows give 0, and a system at rest must stay at rest."""
-        unmet = np.abs(self.contact_jacobian @ v_plus + self.restitution * (self.contact_jacobian @ self.velocity))
-        return float(np.max(over(unmet, np.linalg.norm(self.rows, axis=1) * self.speed), initial=0.0))
+        """max |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|); zero rows give 0, and a system at rest must stay at
+        rest."""
+        unmet = np.abs(
+            self.contact_jacobian @ v_plus
+            + self.restitution * (self.contact_jacobian @ self.velocity)
+        )
+        return float(
+            np.max(over(unmet, np.linalg.norm(self.rows, axis=1) * self.speed), initial=0.0)
+        )
 
     @cached_property
     def _answers(self) -> dict[int, Any]:
-        """Answers of resolvers for this case, by id(resolver). Each entry holds the resolver, so the id stays valid."""
+        """Answers of resolvers for this case, by id(resolver). Each entry holds the resolver, so
+        the id stays valid."""
         return {}
 
 
 # Random impacts of many kinds, as the kit draws them.
 MASS_KINDS = ("spectral", "graded", "arrow", "diagonal", "identity")
-# Nearly dependent rows are listed three times, because most bugs of rank and conditioning show there.
+# Nearly dependent rows are listed three times, because most bugs of rank and conditioning show
+# there.
 _NEAR = ("nearly dependent",) * 3
-ROW_KINDS = ("generic", "kinetic", "dependent", "scaled", "copies", "zeros", "none", "cradle", *_NEAR)
+ROW_KINDS = (
+    "generic",
+    "kinetic",
+    "dependent",
+    "scaled",
+    "copies",
+    "zeros",
+    "none",
+    "cradle",
+    *_NEAR,
+)
 VELOCITY_KINDS = ("normal", "kinetic normal", "light direction", "grazing", "unseen")
 RESTITUTIONS = (-1.0, 0.0, 0.5, 1.0, 1.0)
-# W = J M⁻¹ Jᵀ of rows this close has singular values down to closeness²: an inverse of W errs by ε / closeness², 1e-6
-# to 1e-3, and numpy's cutoff of 1e-15 keeps them. Half of the errors are gains, whichever BLAS rounds.
+# W = J M⁻¹ Jᵀ of rows this close has singular values down to closeness²: an inverse of W errs by ε
+# / closeness², 1e-6 to 1e-3, and numpy's cutoff of 1e-15 keeps them. Half of the errors are gains,
+# whichever BLAS rounds.
 ADVERSE, ADVERSE_CLOSENESS = 24, (5.0, 6.5)
 
 
-# Sizes and units that ordinary draws never reach. Every LARGE_EVERY-th impact is large and takes these kinds in turn:
-# many contacts on few coordinates, many coordinates, and rarely both, because that is slow.
+# Sizes and units that ordinary draws never reach. Every LARGE_EVERY-th impact is large and takes
+# these kinds in turn: many contacts on few coordinates, many coordinates, and rarely both, because
+# that is slow.
 LARGE_EVERY = 10
 LARGE_KINDS = ("contacts", "coordinates", "contacts", "coordinates", "contacts and coordinates")
 LARGE_COORDINATES, LARGE_CONTACTS = (11, 40), (101, 500)
@@ -213,8 +245,11 @@ LARGE_COORDINATES, LARGE_CONTACTS = (11, 40), (101, 500)
 SCALE_POWERS = 27
 
 
-def draw_wide_case(rng: np.random.Generator, number: int, largest_condition: float = 1e8) -> ImpactCase:
-    """Return impact `number` of a series. One in ten is large, half use other units, some are at rest or partly so."""
+def draw_wide_case(
+    rng: np.random.Generator, number: int, largest_condition: float = 1e8
+) -> ImpactCase:
+    """Return impact `number` of a series. One in ten is large, half use other units, some are at
+    rest or partly so."""
     large = number % LARGE_EVERY == LARGE_EVERY // 2
     kind = LARGE_KINDS[number // LARGE_EVERY % len(LARGE_KINDS)] if large else ""
     contacts = int(rng.integers(*LARGE_CONTACTS, endpoint=True)) if "contacts" in kind else None
@@ -229,15 +264,24 @@ def draw_wide_case(rng: np.random.Generator, number: int, largest_condition: flo
         return replace(case, velocity=v, family=name)
     m, j, s = np.ldexp(1.0, rng.integers(-SCALE_POWERS, SCALE_POWERS + 1, size=3))
     name += f", times M {m:.0e} J {j:.0e} v {s:.0e}"
-    return replace(case, mass_matrix=m * case.mass_matrix, contact_jacobian=j * case.contact_jacobian,
-                   velocity=s * v, family=name)
+    return replace(
+        case,
+        mass_matrix=m * case.mass_matrix,
+        contact_jacobian=j * case.contact_jacobian,
+        velocity=s * v,
+        family=name,
+    )
 
 
 def draw_case(
-    rng: np.random.Generator, largest_condition: float = 1e8, coordinates: int | None = None,
-    contacts: int | None = None, row_kinds: tuple[str, ...] = ROW_KINDS,
+    rng: np.random.Generator,
+    largest_condition: float = 1e8,
+    coordinates: int | None = None,
+    contacts: int | None = None,
+    row_kinds: tuple[str, ...] = ROW_KINDS,
 ) -> ImpactCase:
-    """Return one random impact with κ(M) up to `largest_condition`; by default d ≤ 10 and c ≤ 2 d + 1."""
+    """Return one random impact with κ(M) up to `largest_condition`; by default d ≤ 10 and c ≤ 2 d +
+    1."""
     rows_kind = _one_of(rng, row_kinds)
     d = int(rng.integers(1, 11)) if coordinates is None else coordinates
     condition = 10.0 ** rng.uniform(0.0, np.log10(largest_condition))
@@ -253,7 +297,8 @@ def draw_case(
 
 
 def adverse_cases(rng: np.random.Generator) -> Iterator[ImpactCase]:
-    """Yield elastic impacts for which a formula with the inverse of W gains energy under every BLAS.
+    """Yield elastic impacts for which a formula with the inverse of W gains energy under every
+    BLAS.
 
     The generator does not use BLAS, so a seed gives the same bits on every processor.
     """
@@ -262,7 +307,9 @@ def adverse_cases(rng: np.random.Generator) -> Iterator[ImpactCase]:
         closeness = 10.0 ** -rng.uniform(*ADVERSE_CLOSENESS)
         rows = rng.normal(size=d) + closeness * rng.normal(size=(d, d))
         mass = np.diag(rng.uniform(0.1, 1.0, size=d))
-        yield ImpactCase(mass, rows, rng.normal(size=d), 1.0, f"diagonal mass, {d} rows within {closeness:.0e}")
+        yield ImpactCase(
+            mass, rows, rng.normal(size=d), 1.0, f"diagonal mass, {d} rows within {closeness:.0e}"
+        )
 
 
 def _one_of(rng: np.random.Generator, kinds: tuple[str, ...]) -> str:
@@ -271,9 +318,14 @@ def _one_of(rng: np.random.Generator, kinds: tuple[str, ...]) -> str:
 
 
 def with_unequal_restitution(rng: np.random.Generator, case: ImpactCase) -> ImpactCase:
-    """Return the case with a restitution per row: either 0 and 1 at random, or uniform in [0, 1]."""
+    """Return the case with a restitution per row: either 0 and 1 at random, or uniform in [0,
+    1]."""
     extremes = rng.random() < 0.5
-    e = rng.choice([0.0, 1.0], size=case.contacts) if extremes else rng.uniform(0.0, 1.0, size=case.contacts)
+    e = (
+        rng.choice([0.0, 1.0], size=case.contacts)
+        if extremes
+        else rng.uniform(0.0, 1.0, size=case.contacts)
+    )
     return replace(case, family=case.family + ", unequal e", unequal=e)
 
 
@@ -298,7 +350,9 @@ def draw_mass_matrix(rng: np.random.Generator, kind: str, d: int, condition: flo
         return s[:, None] * inner * s
     if kind == "arrow":  # one body coupled to many
         mass = np.diag(spectrum)
-        mass[0, 1:] = mass[1:, 0] = 0.9 * np.sqrt(spectrum[1:] / d) * rng.choice([-1.0, 1.0], size=d - 1)
+        mass[0, 1:] = mass[1:, 0] = (
+            0.9 * np.sqrt(spectrum[1:] / d) * rng.choice([-1.0, 1.0], size=d - 1)
+        )
         return mass
     return with_spectrum(rng, spectrum)
 
@@ -306,7 +360,8 @@ def draw_mass_matrix(rng: np.random.Generator, kind: str, d: int, condition: flo
 def draw_rows(
     rng: np.random.Generator, kind: str, mass: Floats, contacts: int | None = None
 ) -> tuple[Floats, str]:
-    """Return J (c, d) of the kind, and a label that says how close to dependent its rows are ("" for most kinds)."""
+    """Return J (c, d) of the kind, and a label that says how close to dependent its rows are (""
+    for most kinds)."""
     d = len(mass)
     c = int(rng.integers(1, 2 * d + 2)) if contacts is None else contacts
     generic = rng.normal(size=(c, d))
@@ -333,15 +388,16 @@ def draw_rows(
 
 
 def cradle_rows(d: int) -> Floats:
-    """Return the rows (d − 1, d) of d bodies in a line, each in contact with the next: entries +1 and −1."""
+    """Return the rows (d − 1, d) of d bodies in a line, each in contact with the next: entries +1
+    and −1."""
     return np.eye(d)[: d - 1] - np.eye(d, k=1)[: d - 1]
 
 
 def draw_velocity(rng: np.random.Generator, kind: str, mass: Floats, rows: Floats) -> Floats:
     """Return v (d,) of the kind.
 
-    The kinds are: v normally distributed, Lᵀv normally distributed, v along M's lightest direction, and v with rows @ v
-    nearly or exactly zero.
+    The kinds are: v normally distributed, Lᵀv normally distributed, v along M's lightest direction,
+    and v with rows @ v nearly or exactly zero.
     """
     d = len(mass)
     v = rng.normal(size=d)
@@ -358,8 +414,9 @@ def draw_velocity(rng: np.random.Generator, kind: str, mass: Floats, rows: Float
     return v
 
 
-# Impacts for unilateral contacts and for friction. A textbook method uses W = J M⁻¹ Jᵀ, which squares the closeness of
-# rows, so nearly dependent rows are left out. Exact copies and sums of rows, as for a face on a floor, are included.
+# Impacts for unilateral contacts and for friction. A textbook method uses W = J M⁻¹ Jᵀ, which
+# squares the closeness of rows, so nearly dependent rows are left out. Exact copies and sums of
+# rows, as for a face on a floor, are included.
 ONE_SIDED_ROW_KINDS = ("generic", "kinetic", "dependent", "copies", "zeros", "none", "cradle")
 ONE_SIDED_COORDINATES, ONE_SIDED_CONTACTS = 6, 6
 ONE_SIDED_POWERS = 10  # powers of two in M and v, about ±3 decades: they reveal absolute thresholds
@@ -368,26 +425,43 @@ SWEEPS = 2000  # a tenth of the sweeps that the solver of the reference takes
 FRICTIONAL_KINDS = ("body in the plane", "two bodies in the plane", "body in space", "generic")
 
 
-def draw_one_sided_case(rng: np.random.Generator, number: int, largest_condition: float = 1e4) -> ImpactCase:
-    """Return an impact of unilateral contacts, e in [0, 1]; in two of three impacts every contact approaches."""
-    d, c = int(rng.integers(1, ONE_SIDED_COORDINATES + 1)), int(rng.integers(1, ONE_SIDED_CONTACTS + 1))
+def draw_one_sided_case(
+    rng: np.random.Generator, number: int, largest_condition: float = 1e4
+) -> ImpactCase:
+    """Return an impact of unilateral contacts, e in [0, 1]; in two of three impacts every contact
+    approaches."""
+    d, c = (
+        int(rng.integers(1, ONE_SIDED_COORDINATES + 1)),
+        int(rng.integers(1, ONE_SIDED_CONTACTS + 1)),
+    )
     if rng.random() < 0.2:
         case = _standing_box(rng, c)
     else:
-        case = draw_case(rng, largest_condition, coordinates=d, contacts=c, row_kinds=ONE_SIDED_ROW_KINDS)
+        case = draw_case(
+            rng, largest_condition, coordinates=d, contacts=c, row_kinds=ONE_SIDED_ROW_KINDS
+        )
     return _signed(rng, replace(case, restitution=_push_restitution(rng)))
 
 
-def draw_frictional_case(rng: np.random.Generator, number: int, largest_condition: float = 1e2) -> ImpactCase:
-    """Return an impact with tangents and μ in [0, 2] that plain sweeps solve: bodies, and generic rows.
+def draw_frictional_case(
+    rng: np.random.Generator, number: int, largest_condition: float = 1e2
+) -> ImpactCase:
+    """Return an impact with tangents and μ in [0, 2] that plain sweeps solve: bodies, and generic
+    rows.
 
-    Sweeps over the contacts converge slowly if a normal is nearly parallel to its tangents, or to another normal. About
-    one draw in 60 needs more than SWEEPS; it is drawn again.
+    Sweeps over the contacts converge slowly if a normal is nearly parallel to its tangents, or to
+    another normal. About one draw in 60 needs more than SWEEPS; it is drawn again.
     """
     while True:
         case = _frictional_case(rng, number, largest_condition)
         blocks = np.concatenate([case.contact_jacobian[:, None], np.asarray(case.tangents)], axis=1)
-        given = case.mass_matrix, blocks.reshape(-1, case.coordinates), case.velocity, 0.0, case.friction
+        given = (
+            case.mass_matrix,
+            blocks.reshape(-1, case.coordinates),
+            case.velocity,
+            0.0,
+            case.friction,
+        )
         if settles(ImpactProblem.from_impact(*given, contact_size=blocks.shape[1]), SWEEPS):
             return case
 
@@ -397,7 +471,9 @@ def _frictional_case(rng: np.random.Generator, number: int, largest_condition: f
     if kind == "generic":
         d, c = int(rng.integers(2, ONE_SIDED_COORDINATES + 1)), int(rng.integers(1, 4))
         m = int(rng.integers(1, min(3, d)))
-        mass = draw_mass_matrix(rng, _one_of(rng, MASS_KINDS), d, 10.0 ** rng.uniform(0.0, np.log10(largest_condition)))
+        mass = draw_mass_matrix(
+            rng, _one_of(rng, MASS_KINDS), d, 10.0 ** rng.uniform(0.0, np.log10(largest_condition))
+        )
         drawn, translations = rng.normal(size=(c, 1 + m, d)), None
         rows = drawn / np.linalg.norm(drawn, axis=2, keepdims=True)
     else:
@@ -405,8 +481,16 @@ def _frictional_case(rng: np.random.Generator, number: int, largest_condition: f
     c = len(rows)
     friction = rng.choice([0.0, 0.3, 1.0, float(rng.uniform(0.0, 2.0))], size=c)
     velocity = draw_velocity(rng, _one_of(rng, ("normal", "kinetic normal")), mass, rows[:, 0])
-    case = ImpactCase(mass, rows[:, 0], velocity, _push_restitution(rng), f"{kind}, {c} contacts with friction",
-                      translations, tangents=rows[:, 1:], friction=friction)
+    case = ImpactCase(
+        mass,
+        rows[:, 0],
+        velocity,
+        _push_restitution(rng),
+        f"{kind}, {c} contacts with friction",
+        translations,
+        tangents=rows[:, 1:],
+        friction=friction,
+    )
     return _signed(rng, case)
 
 
@@ -415,46 +499,80 @@ def _push_restitution(rng: np.random.Generator) -> float:
 
 
 def _standing_box(rng: np.random.Generator, contacts: int) -> ImpactCase:
-    """Return a planar body whose face touches the floor at several points: at most two rows are independent."""
-    rows = np.column_stack([np.zeros(contacts), np.ones(contacts), rng.uniform(-0.5, 0.5, size=contacts)])
+    """Return a planar body whose face touches the floor at several points: at most two rows are
+    independent."""
+    rows = np.column_stack(
+        [np.zeros(contacts), np.ones(contacts), rng.uniform(-0.5, 0.5, size=contacts)]
+    )
     mass = np.diag([1.0, 1.0, float(rng.uniform(0.02, 1.0))])
-    return ImpactCase(mass, rows, rng.normal(size=3), 0.0, f"a face on the floor at {contacts} points")
+    return ImpactCase(
+        mass, rows, rng.normal(size=3), 0.0, f"a face on the floor at {contacts} points"
+    )
 
 
 def _signed(rng: np.random.Generator, case: ImpactCase) -> ImpactCase:
-    """Return the case, perhaps in other units of M and v; the normals either all approach or stay as drawn."""
+    """Return the case, perhaps in other units of M and v; the normals either all approach or stay
+    as drawn."""
     signs = _one_of(rng, SIGNS)
     rows = case.contact_jacobian
     if signs == "approaching":
         rows = np.where((rows @ case.velocity > 0.0)[:, None], -rows, rows)
-    m, s = np.ldexp(1.0, rng.integers(-ONE_SIDED_POWERS, ONE_SIDED_POWERS + 1, size=2) * (rng.random() < 0.5))
-    return replace(case, mass_matrix=m * case.mass_matrix, contact_jacobian=rows, velocity=s * case.velocity,
-                   family=f"{case.family}, {signs}")
+    m, s = np.ldexp(
+        1.0, rng.integers(-ONE_SIDED_POWERS, ONE_SIDED_POWERS + 1, size=2) * (rng.random() < 0.5)
+    )
+    return replace(
+        case,
+        mass_matrix=m * case.mass_matrix,
+        contact_jacobian=rows,
+        velocity=s * case.velocity,
+        family=f"{case.family}, {signs}",
+    )
 
 
 def _bodies(rng: np.random.Generator, kind: str) -> tuple[Floats, Floats, Floats | None]:
-    """Return M, rows (c, 1 + m, d) of normals and tangents, and the translations, for one or two rigid bodies."""
+    """Return M, rows (c, 1 + m, d) of normals and tangents, and the translations, for one or two
+    rigid bodies."""
     inertia = 10.0 ** rng.uniform(-1.0, 0.0, size=6)  # arms are up to 0.7 m
     if kind == "body in space":
         frames = [np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(int(rng.integers(1, 4)))]
         arms = rng.uniform(-0.5, 0.5, size=(len(frames), 3))
-        rows = np.array([[[*n, *np.cross(r, n)] for n in frame] for r, frame in zip(arms, frames, strict=True)])
+        rows = np.array(
+            [[[*n, *np.cross(r, n)] for n in frame] for r, frame in zip(arms, frames, strict=True)]
+        )
         return np.diag([1.0, 1.0, 1.0, *inertia[:3]]), rows, None
     count = int(rng.integers(1, 4))
-    angles, arms = rng.uniform(0.0, 2.0 * np.pi, size=count), rng.uniform(-0.5, 0.5, size=(2, count, 2))
-    axes = [np.column_stack([np.cos(turned), np.sin(turned)]) for turned in (angles + 0.5 * np.pi, angles)]
-    one, other = (np.stack([np.column_stack([axis, arm[:, 0] * axis[:, 1] - arm[:, 1] * axis[:, 0]])
-                            for axis in axes], 1) for arm in arms)
+    angles, arms = (
+        rng.uniform(0.0, 2.0 * np.pi, size=count),
+        rng.uniform(-0.5, 0.5, size=(2, count, 2)),
+    )
+    axes = [
+        np.column_stack([np.cos(turned), np.sin(turned)])
+        for turned in (angles + 0.5 * np.pi, angles)
+    ]
+    one, other = (
+        np.stack(
+            [
+                np.column_stack([axis, arm[:, 0] * axis[:, 1] - arm[:, 1] * axis[:, 0]])
+                for axis in axes
+            ],
+            1,
+        )
+        for arm in arms
+    )
     if kind == "body in the plane":
         return np.diag([1.0, 1.0, inertia[0]]), one, None
     heavier = 10.0 ** rng.uniform(-1.0, 1.0)
     mass = np.diag([1.0, 1.0, inertia[0], heavier, heavier, heavier * inertia[1]])
-    return mass, np.concatenate([one, -other], axis=2), np.array([[1.0, 0, 0, 1, 0, 0], [0, 1.0, 0, 0, 1, 0]])
+    return (
+        mass,
+        np.concatenate([one, -other], axis=2),
+        np.array([[1.0, 0, 0, 1, 0, 0], [0, 1.0, 0, 0, 1, 0]]),
+    )
 
 
-# Impacts for the algebraic claims: mass matrices of given condition, rows of given rank. Rows are small integers, and
-# redundant rows are integer combinations of independent ones. Rank and redundancy are therefore exact in doubles, and
-# the same impact can be solved in rationals.
+# Impacts for the algebraic claims: mass matrices of given condition, rows of given rank. Rows are
+# small integers, and redundant rows are integer combinations of independent ones. Rank and
+# redundancy are therefore exact in doubles, and the same impact can be solved in rationals.
 WHOLE = 5  # entries of rows lie in -5..5
 
 
@@ -471,7 +589,11 @@ def draw_of_rank(family: Family, count: int, seed: int) -> Iterator[ImpactCase]:
     """Yield `count` impacts; the same seed gives the same ones."""
     rng = np.random.default_rng([seed, *(round(number) for number in family)])
     half = 0.5 * np.log10(family.condition_number)
-    spectrum = 10.0 ** np.linspace(-half, half, family.coordinates) if family.coordinates > 1 else np.ones(1)
+    spectrum = (
+        10.0 ** np.linspace(-half, half, family.coordinates)
+        if family.coordinates > 1
+        else np.ones(1)
+    )
     for _ in range(count):
         mass = with_spectrum(rng, spectrum)
         velocity = rng.standard_normal(family.coordinates)
@@ -487,18 +609,22 @@ def approaching(case: ImpactCase) -> ImpactCase:
 
 
 def whole_numbers(family: Family, count: int, seed: int) -> Iterator[ImpactCase]:
-    """Yield impacts of integers (as doubles) with M = B Bᵀ + I, so that exact rationals stay short."""
+    """Yield impacts of integers (as doubles) with M = B Bᵀ + I, so that exact rationals stay
+    short."""
     rng = np.random.default_rng([seed, *(round(number) for number in family), 1])
     d = family.coordinates
     for _ in range(count):
         factor = rng.integers(-3, 4, (d, d)).astype(np.float64)
         velocity = rng.integers(-9, 10, d).astype(np.float64)
         velocity[0] += not velocity.any()
-        yield ImpactCase(factor @ factor.T + np.eye(d), _rows_of_rank(rng, family), velocity, rank=family.rank)
+        yield ImpactCase(
+            factor @ factor.T + np.eye(d), _rows_of_rank(rng, family), velocity, rank=family.rank
+        )
 
 
 def _rows_of_rank(rng: np.random.Generator, family: Family) -> Floats:
-    """Return integer rows (c, d) of exact rank `family.rank`; the first `rank` of them are independent."""
+    """Return integer rows (c, d) of exact rank `family.rank`; the first `rank` of them are
+    independent."""
     rank, spare = family.rank, family.contacts - family.rank
     while True:
         basis = rng.integers(-WHOLE, WHOLE + 1, (rank, family.coordinates)).astype(np.float64)
@@ -508,26 +634,43 @@ def _rows_of_rank(rng: np.random.Generator, family: Family) -> Floats:
     return np.vstack([basis, mixing @ basis])
 
 
-# Impacts for which equalities and complementarity have the same exact answer, so that both errors can be measured.
-# The velocity is u⁻ = −Aᵀw + z with w > 0 and A z = 0. Then p = (1 + e) w pushes at every contact, so the equality law
-# (21) and Newton's LCP have the same v⁺ (up to the rounding of v⁻ in nearly dependent directions).
-TIMED_HARDNESS = tuple((condition, closeness) for condition in (1e0, 1e3, 1e6) for closeness in (1.0, 1e-3, 1e-6))
+# Impacts for which equalities and complementarity have the same exact answer, so that both errors
+# can be measured. The velocity is u⁻ = −Aᵀw + z with w > 0 and A z = 0. Then p = (1 + e) w pushes
+# at every contact, so the equality law (21) and Newton's LCP have the same v⁺ (up to the rounding
+# of v⁻ in nearly dependent directions).
+TIMED_HARDNESS = tuple(
+    (condition, closeness) for condition in (1e0, 1e3, 1e6) for closeness in (1.0, 1e-3, 1e-6)
+)
 
 
 def timed_problems(contacts: int, coordinates: int, seed: int = 0) -> tuple[ImpactCase, ...]:
-    """Return nine impacts of one size: three condition numbers of M times three closenesses of the rows.
+    """Return nine impacts of one size: three condition numbers of M times three closenesses of the
+    rows.
 
     The restitution takes the values 0, 1/2 and 1 in turn.
     """
-    return tuple(_timed_problem(coordinates, contacts, condition, closeness, (0.0, 0.5, 1.0)[(k + k // 3) % 3], seed)
-                 for k, (condition, closeness) in enumerate(TIMED_HARDNESS))
+    return tuple(
+        _timed_problem(
+            coordinates, contacts, condition, closeness, (0.0, 0.5, 1.0)[(k + k // 3) % 3], seed
+        )
+        for k, (condition, closeness) in enumerate(TIMED_HARDNESS)
+    )
 
 
-def _timed_problem(d: int, c: int, condition: float, closeness: float, e: float, seed: int) -> ImpactCase:
+def _timed_problem(
+    d: int, c: int, condition: float, closeness: float, e: float, seed: int
+) -> ImpactCase:
     rng = np.random.default_rng([seed, d, c, int(np.log10(condition)), int(-np.log10(closeness))])
     mass = with_spectrum(rng, condition ** -np.linspace(0.0, 1.0, d))
-    case = ImpactCase(mass, _near_rows(rng, d, c, closeness), np.zeros(d), e, "timed", mass_condition=condition,
-                      closeness=closeness)
+    case = ImpactCase(
+        mass,
+        _near_rows(rng, d, c, closeness),
+        np.zeros(d),
+        e,
+        "timed",
+        mass_condition=condition,
+        closeness=closeness,
+    )
     whitened, length = case.rows, np.linalg.norm(case.rows, axis=1)
     approach = -whitened.T @ (rng.uniform(0.2, 1.0, size=c) / np.where(length > 0.0, length, 1.0))
     sliding = rng.normal(size=d)
@@ -540,7 +683,8 @@ def _timed_problem(d: int, c: int, condition: float, closeness: float, e: float,
 
 
 def _near_rows(rng: np.random.Generator, d: int, c: int, closeness: float) -> Floats:
-    """Return rows (c, d) whose second half copies the first half up to the relative distance `closeness`.
+    """Return rows (c, d) whose second half copies the first half up to the relative distance
+    `closeness`.
 
     For c > d the rows span at most two thirds of the d dimensions.
     """
@@ -551,21 +695,27 @@ def _near_rows(rng: np.random.Generator, d: int, c: int, closeness: float) -> Fl
     if closeness < 1.0:
         half = c // 2
         copied = base[: c - half]
-        base[half:] = copied + closeness * np.linalg.norm(copied, axis=1)[:, None] * rng.normal(size=(c - half, d))
+        base[half:] = copied + closeness * np.linalg.norm(copied, axis=1)[:, None] * rng.normal(
+            size=(c - half, d)
+        )
     return base
 
 
-# Inputs of any size, for the promise that every finite input gives a finite motion or an error by name.
+# Inputs of any size, for the promise that every finite input gives a finite motion or an error by
+# name.
 EXTREME_SIZES = (5e-324, 1e-310, 1e-160, 1e-30, 1.0, 1e30, 1e160, 1.7e308)
 EXTREME_MASSES = ("spectral", "graded", "singular", "indefinite", "asymmetric", "zero")
 EXTREME_ROWS = ("generic", "dependent", "scaled", "copies", "none", "zeros", "huge")
 
 
 def draw_extreme_case(rng: np.random.Generator) -> ImpactCase:
-    """Return M, J and v with magnitudes between the smallest and the largest double; M is not always a mass matrix."""
+    """Return M, J and v with magnitudes between the smallest and the largest double; M is not
+    always a mass matrix."""
     d = int(rng.integers(1, 7))
     kind, rows_kind = str(rng.choice(EXTREME_MASSES)), str(rng.choice(EXTREME_ROWS))
-    mass = draw_mass_matrix(rng, "graded" if kind == "graded" else "spectral", d, 10.0 ** rng.uniform(0.0, 18.0))
+    mass = draw_mass_matrix(
+        rng, "graded" if kind == "graded" else "spectral", d, 10.0 ** rng.uniform(0.0, 18.0)
+    )
     if kind == "singular":
         mass = np.outer(mass[0], mass[0])
     if kind == "indefinite":
@@ -581,20 +731,35 @@ def draw_extreme_case(rng: np.random.Generator) -> ImpactCase:
 
 
 def _sized(rng: np.random.Generator, array: Floats) -> Floats:
-    """Scale the array by one magnitude, or each entry by its own (symmetric for a square array); keep it finite."""
-    sizes = rng.choice(EXTREME_SIZES, size=array.shape) if rng.random() < 0.2 else float(rng.choice(EXTREME_SIZES))
+    """Scale the array by one magnitude, or each entry by its own (symmetric for a square array);
+    keep it finite."""
+    sizes = (
+        rng.choice(EXTREME_SIZES, size=array.shape)
+        if rng.random() < 0.2
+        else float(rng.choice(EXTREME_SIZES))
+    )
     if isinstance(sizes, np.ndarray) and array.ndim == 2 and array.shape[0] == array.shape[1]:
         sizes = np.maximum(sizes, sizes.T)
     return np.asarray(np.clip(array * sizes, -1.7e308, 1.7e308))
 
 
-# Many impacts of one size, for compiled resolvers: families in which rounding gains most, an ordinary one, and rows of
-# any rank in any metric. Three quarters of the impacts are elastic.
-ADVERSE_FAMILIES = ("ordinary", "light directions", "nearly dependent rows", "M asymmetric in the last bit",
-                    "subnormal velocities", "600 decades")
+# Many impacts of one size, for compiled resolvers: families in which rounding gains most, an
+# ordinary one, and rows of any rank in any metric. Three quarters of the impacts are elastic.
+ADVERSE_FAMILIES = (
+    "ordinary",
+    "light directions",
+    "nearly dependent rows",
+    "M asymmetric in the last bit",
+    "subnormal velocities",
+    "600 decades",
+)
 ANY_RANK = "any rank"
-_DECADES = {"light directions": 12.0, "nearly dependent rows": 6.0, "M asymmetric in the last bit": 12.0,
-            ANY_RANK: 12.0}
+_DECADES = {
+    "light directions": 12.0,
+    "nearly dependent rows": 6.0,
+    "M asymmetric in the last bit": 12.0,
+    ANY_RANK: 12.0,
+}
 
 
 class Impacts(NamedTuple):
@@ -614,7 +779,10 @@ def draw_impacts(rng: np.random.Generator, family: str, n: int, d: int, c: int) 
     e = np.where(rng.random(n) < 0.75, 1.0, rng.uniform(-1.0, 1.0, n))
     columns: Floats = rng.normal(size=(n, d, c))
     v: Floats = rng.normal(size=(n, d))
-    if family in ("light directions", "M asymmetric in the last bit"):  # rows random in the kinetic metric
+    if family in (
+        "light directions",
+        "M asymmetric in the last bit",
+    ):  # rows random in the kinetic metric
         values, axes = np.linalg.eigh(mass)
         columns, v = (axes * np.sqrt(np.abs(values))[:, None, :]) @ columns, axes[:, :, 0]
     if family == "nearly dependent rows":
@@ -622,20 +790,35 @@ def draw_impacts(rng: np.random.Generator, family: str, n: int, d: int, c: int) 
     if family == "M asymmetric in the last bit":
         moved = np.nextafter(mass, np.where(rng.random((n, d, d)) < 0.5, np.inf, -np.inf))
         mass = np.where(np.triu(np.ones((d, d), bool), 1), moved, mass)
-    if family == "subnormal velocities":  # small integers times a power of two between 2⁻¹⁰⁷⁴ and 2⁻¹⁰⁵¹
-        v = np.rint(4.0 * v) * np.ldexp(1.0, rng.integers(-1074, -1050, n).astype(np.int32))[:, None]
+    if (
+        family == "subnormal velocities"
+    ):  # small integers times a power of two between 2⁻¹⁰⁷⁴ and 2⁻¹⁰⁵¹
+        v = (
+            np.rint(4.0 * v)
+            * np.ldexp(1.0, rng.integers(-1074, -1050, n).astype(np.int32))[:, None]
+        )
     if family == "600 decades":  # the energy fits a double, some products do not
-        unit, speed = 10.0 ** rng.uniform(-75.0, 75.0, (n, d)), 10.0 ** rng.uniform(-75.0, 75.0, (n, 1))
-        mass = mass * unit[:, :, None] * unit[:, None, :] * 10.0 ** rng.uniform(-120.0, 120.0, (n, 1, 1))
+        unit, speed = (
+            10.0 ** rng.uniform(-75.0, 75.0, (n, d)),
+            10.0 ** rng.uniform(-75.0, 75.0, (n, 1)),
+        )
+        mass = (
+            mass
+            * unit[:, :, None]
+            * unit[:, None, :]
+            * 10.0 ** rng.uniform(-120.0, 120.0, (n, 1, 1))
+        )
         columns, v = columns * unit[:, :, None], v / unit * speed
     if family == ANY_RANK:
         columns, v = _of_any_rank(rng, mass, columns, v)
     return Impacts(*(np.ascontiguousarray(array) for array in (mass, columns, v, e, 10.0**power)))
 
 
-def _of_any_rank(rng: np.random.Generator, mass: Floats, columns: Floats, v: Floats) -> tuple[Floats, Floats]:
-    """Return generic, dependent, copied or nearly dependent rows, and each of rows and v in the kinetic metric or not.
-    """
+def _of_any_rank(
+    rng: np.random.Generator, mass: Floats, columns: Floats, v: Floats
+) -> tuple[Floats, Floats]:
+    """Return generic, dependent, copied or nearly dependent rows, and each of rows and v in the
+    kinetic metric or not."""
     (n, d, c), kind, lower = columns.shape, rng.integers(4), np.linalg.cholesky(mass)
     rank = int(rng.integers(1, min(max(c, 1), d) + 1))
     basis, near = rng.normal(size=(n, d, rank)), 10.0 ** -rng.uniform(1.0, 16.0, (n, 1, 1))

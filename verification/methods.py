@@ -1,7 +1,8 @@
-"""Other methods for an impact, to compare `iapb.resolve_impact` with: plain numpy, unscaled, without clamp.
+"""Other methods for an impact, to compare `iapb.resolve_impact` with: plain numpy, unscaled,
+without clamp.
 
-Each returns v⁺ (d,) from M (d, d), J (c, d), v (d,) and e. Through LAPACK the last bits depend on the processor, and
-where W = J M⁻¹ Jᵀ is formed, its condition number amplifies them.
+Each returns v⁺ (d,) from M (d, d), J (c, d), v (d,) and e. Through LAPACK the last bits depend on
+the processor, and where W = J M⁻¹ Jᵀ is formed, its condition number amplifies them.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from verification.impacts import EPS, Floats, ImpactCase
 
 
 def gram_pinv(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Return v⁺ by (20)-(21) as printed, with numpy's pseudo-inverse and its classical cutoff 1e-15."""
+    """Return v⁺ by (20)-(21) as printed, with numpy's pseudo-inverse and its classical cutoff
+    1e-15."""
     push = np.linalg.solve(M, J.T)
     return np.asarray(v - (1.0 + e) * (push @ (np.linalg.pinv(J @ push, rcond=1e-15) @ (J @ v))))
 
@@ -27,18 +29,27 @@ def gram_cholesky(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
     push = np.linalg.solve(M, J.T)
     W = J @ push
     length, scale = np.sqrt(np.maximum(np.diag(W), 0.0)), np.sqrt(np.diag(M))
-    # The solution with M leaves the smallest eigenvalue of the Gram matrix of unit rows known to c·ε·κ only.
+    # The solution with M leaves the smallest eigenvalue of the Gram matrix of unit rows known to
+    # c·ε·κ only.
     known = 8.0 * len(J) * EPS * np.linalg.cond(M / np.outer(scale, scale))
-    if not length.all() or np.linalg.eigvalsh(W / np.outer(length, length)).min(initial=1.0) <= known:
-        raise ArgumentError("contact_jacobian", J.shape, "independent rows for method 'gram_cholesky'")
+    if (
+        not length.all()
+        or np.linalg.eigvalsh(W / np.outer(length, length)).min(initial=1.0) <= known
+    ):
+        raise ArgumentError(
+            "contact_jacobian", J.shape, "independent rows for method 'gram_cholesky'"
+        )
     root = np.linalg.cholesky(0.5 * (W + W.T))
-    return np.asarray(v - (1.0 + e) * (push @ np.linalg.solve(root.T, np.linalg.solve(root, J @ v))))
+    return np.asarray(
+        v - (1.0 + e) * (push @ np.linalg.solve(root.T, np.linalg.solve(root, J @ v)))
+    )
 
 
 def damped(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
     """Return v⁺ by (W + λI)⁻¹, λ = c ε of W's largest diagonal entry, the rounding of W.
 
-    Each mode keeps part of its approach: with 1e-8, 1e-10, 1e-12 or 1e-14 in place of c ε more hard cases fail.
+    Each mode keeps part of its approach: with 1e-8, 1e-10, 1e-12 or 1e-14 in place of c ε more hard
+    cases fail.
     """
     push = np.linalg.solve(M, J.T)
     W = J @ push
@@ -47,7 +58,8 @@ def damped(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
 
 
 def svd(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Return v⁺ by (21) with the projector from the truncated singular value decomposition of the unit rows of A."""
+    """Return v⁺ by (21) with the projector from the truncated singular value decomposition of the
+    unit rows of A."""
     case = ImpactCase(M, J, v)
     _, singular, right = np.linalg.svd(case.unit_rows, full_matrices=False)
     Q = right[singular > rank_tolerance(case.lower)]

@@ -1,7 +1,8 @@
-"""Region: the bounds on one or two conditions inside which a claim holds; how it is found and confirmed.
+"""Region: the bounds on one or two conditions inside which a claim holds; how it is found and
+confirmed.
 
-A region is found on one half of the trials. It is confirmed if the claim holds in all trials of the other half that lie
-inside it and in all fresh trials drawn inside it.
+A region is found on one half of the trials. It is confirmed if the claim holds in all trials of the
+other half that lie inside it and in all fresh trials drawn inside it.
 """
 
 from __future__ import annotations
@@ -16,8 +17,9 @@ import numpy as np
 
 from verification.table import Column, Row, Table
 
-# Least number of trials that confirm a region. If the claim were wrong in a quarter of the region, ten trials in a row
-# would hold with probability 0.05 (0.74¹⁰); if it were wrong in half, with probability 1/1024. A single failure counts.
+# Least number of trials that confirm a region. If the claim were wrong in a quarter of the region,
+# ten trials in a row would hold with probability 0.05 (0.74¹⁰); if it were wrong in half, with
+# probability 1/1024. A single failure counts.
 LEAST_CONFIRMING = 10
 SPLIT_SEED = 20050601  # decides which half of the trials is searched; the month the paper appeared
 _MOST_ENDS = 8  # above the number of ends of two intervals
@@ -26,13 +28,16 @@ _DECADES = 1e3  # a condition with a larger ratio of its ends is measured in dec
 
 @dataclass(frozen=True)
 class Region:
-    """Region in which a part holds: bounds on one or two conditions. The claim holds in every trial inside.
+    """Region in which a part holds: bounds on one or two conditions. The claim holds in every trial
+    inside.
 
-    bounds : condition, its unit, lowest and highest value, which may be equal; None if the region extends to the end of
-        the tested range
-    searched : number of trials inside, from the half in which the region was found; others : from the other half
+    bounds : condition, its unit, lowest and highest value, which may be equal; None if the region
+        extends to the end of the tested range
+    searched : number of trials inside, from the half in which the region was found; others : from
+        the other half
     fresh : number of trials drawn for the confirmation
-    share : share of the tested range that the region covers, by length or by decades; 0 for a single value
+    share : share of the tested range that the region covers, by length or by decades; 0 for a
+        single value
     """
 
     bounds: tuple[tuple[str, str, float | None, float | None], ...]
@@ -43,12 +48,17 @@ class Region:
 
     def contains(self, row: Row) -> bool:
         """Whether a trial lies inside the region or on its bounds."""
-        return all((low is None or row[key] >= low) and (high is None or row[key] <= high)
-                   for key, _, low, high in self.bounds)  # fmt: skip
+        return all(
+            (low is None or row[key] >= low) and (high is None or row[key] <= high)
+            for key, _, low, high in self.bounds
+        )
 
     def ends(self, key: str, tested: Sequence[float]) -> tuple[float, float]:
-        """Return the bounds of a condition; the end of the tested range replaces a missing bound."""
-        low, high = next(((low, high) for name, _, low, high in self.bounds if name == key), (None, None))
+        """Return the bounds of a condition; the end of the tested range replaces a missing
+        bound."""
+        low, high = next(
+            ((low, high) for name, _, low, high in self.bounds if name == key), (None, None)
+        )
         return min(tested) if low is None else low, max(tested) if high is None else high
 
     def __str__(self) -> str:
@@ -58,24 +68,35 @@ class Region:
 
 def _bound(key: str, unit: str, low: float | None, high: float | None) -> str:
     key = key.replace("_", " ")
-    least, most = "" if low is None else _inward(low, math.ceil), "" if high is None else _inward(high, math.floor)
+    least, most = (
+        "" if low is None else _inward(low, math.ceil),
+        "" if high is None else _inward(high, math.floor),
+    )
     if low == high:
         return f"{key} = {least} {unit}".rstrip()
     if not least:
         return f"{key} <= {most} {unit}".rstrip()
-    return f"{least} <= {key} <= {most} {unit}".rstrip() if most else f"{key} >= {least} {unit}".rstrip()
+    return (
+        f"{least} <= {key} <= {most} {unit}".rstrip()
+        if most
+        else f"{key} >= {least} {unit}".rstrip()
+    )
 
 
 def _inward(end: float, rounded: Callable[[float], int]) -> str:
     """Return a bound with at most three digits; one that has more is rounded into the region."""
     digits = 2 - math.floor(math.log10(abs(end))) if end else 0
-    return f"{end:g}" if len(f"{end:g}") <= 5 else f"{rounded(end * 10.0**digits) / 10.0**digits:.3g}"
+    return (
+        f"{end:g}" if len(f"{end:g}") <= 5 else f"{rounded(end * 10.0**digits) / 10.0**digits:.3g}"
+    )
 
 
 def confirmed(trials: Table, fresh: Callable[[Region], Table] | None) -> tuple[Region | None, str]:
-    """Return the region that the other half and fresh trials confirm, and the result of the search in words.
+    """Return the region that the other half and fresh trials confirm, and the result of the search
+    in words.
 
-    If the other half contradicts the region, both halves are searched; then only fresh trials can confirm a region.
+    If the other half contradicts the region, both halves are searched; then only fresh trials can
+    confirm a region.
     """
     first = np.zeros(len(trials.rows), np.bool_)
     first[np.random.default_rng(SPLIT_SEED).permutation(len(trials.rows))[::2]] = True
@@ -83,13 +104,18 @@ def confirmed(trials: Table, fresh: Callable[[Region], Table] | None) -> tuple[R
     if region is None and fresh is None:  # all of this half may hold: search the other
         first = ~first
         region = search_region(trials.only(first))
-    inside = trials.only(not searched and region is not None and region.contains(row)
-                         for searched, row in zip(first, trials.records(), strict=True))  # fmt: skip
+    inside = trials.only(
+        not searched and region is not None and region.contains(row)
+        for searched, row in zip(first, trials.records(), strict=True)
+    )
     if region is None or False in inside.holds:
         contradicted = f"{region} fails in {_failing(inside)} other trials" if region else ""
         region, inside = (search_region(trials), trials.only(())) if fresh else (None, inside)
         if region is None:
-            return None, f"no range is confirmed: {contradicted}" if contradicted else "no range is found"
+            return (
+                None,
+                f"no range is confirmed: {contradicted}" if contradicted else "no range is found",
+            )
     drawn = fresh(region) if fresh else inside.only(())
     if False in drawn.holds:
         return None, f"no range is confirmed: {region} fails in {_failing(drawn)} fresh trials"
@@ -98,7 +124,10 @@ def confirmed(trials: Table, fresh: Callable[[Region], Table] | None) -> tuple[R
     open_ = drawn.holds.count(None) + inside.holds.count(None)
     counts = f"{region.searched} trials that led to this range, {region.others} others{new}"
     if (region.fresh if fresh else region.others) < LEAST_CONFIRMING:
-        return None, f"no range is confirmed: where {region}, it holds in {counts}; needed: {LEAST_CONFIRMING} {kind}"
+        return (
+            None,
+            f"no range is confirmed: where {region}, it holds in {counts}; needed: {LEAST_CONFIRMING} {kind}",
+        )
     covered = f" ({region.share:.0%} of the tested range)" if region.share else ""
     undecided = f"; {open_} more cannot tell" if open_ else ""
     return region, f"where {region}{covered}, it holds in all {counts}{undecided}"
@@ -109,18 +138,29 @@ def _failing(trials: Table) -> str:
 
 
 def search_region(trials: Table) -> Region | None:
-    """Return the region, bounded in one or two conditions, with most trials and no failure; None if there is none.
+    """Return the region, bounded in one or two conditions, with most trials and no failure; None if
+    there is none.
 
-    The search tries every value and every interval between values of a condition, alone and with those of every other
-    condition. Among regions with equally many trials it takes the one with the fewest bounds, then the first in the
-    order of the columns. It adds a second condition only if the region then keeps at least 1.5 times as many trials,
-    because the simpler region generalizes better.
+    The search tries every value and every interval between values of a condition, alone and with
+    those of every other condition. Among regions with equally many trials it takes the one with the
+    fewest bounds, then the first in the order of the columns. It adds a second condition only if
+    the region then keeps at least 1.5 times as many trials, because the simpler region generalizes
+    better.
     """
-    scales = [scale for column in trials.columns if column.condition and (scale := _intervals(column, trials))]
+    scales = [
+        scale
+        for column in trials.columns
+        if column.condition and (scale := _intervals(column, trials))
+    ]
     everything = [_Interval("", "", None, None, 1.0, np.ones(len(trials.rows), np.bool_))]
     alone, together = (
-        max((_best(trials, *pair) for pair in pairs), default=(0, 0, ()), key=lambda found: found[:2])
-        for pairs in (((scale, everything) for scale in scales), combinations(scales, 2)))  # fmt: skip
+        max(
+            (_best(trials, *pair) for pair in pairs),
+            default=(0, 0, ()),
+            key=lambda found: found[:2],
+        )
+        for pairs in (((scale, everything) for scale in scales), combinations(scales, 2))
+    )
     kept, _, chosen = together if 2 * together[0] >= 3 * alone[0] else alone
     if not kept or not chosen:
         return None
@@ -143,22 +183,34 @@ class _Interval(NamedTuple):
         return len({self.low, self.high} - {None})
 
 
-def _best(trials: Table, first: list[_Interval], second: list[_Interval]) -> tuple[int, int, tuple[_Interval, ...]]:
-    """Number of trials that the best pair of intervals keeps without a failure, minus the number of its bounds, and
-    those of the two with a bound."""
-    held, failed = (np.array([outcome is wanted for outcome in trials.holds]) for wanted in (True, False))
+def _best(
+    trials: Table, first: list[_Interval], second: list[_Interval]
+) -> tuple[int, int, tuple[_Interval, ...]]:
+    """Number of trials that the best pair of intervals keeps without a failure, minus the number of
+    its bounds, and those of the two with a bound."""
+    held, failed = (
+        np.array([outcome is wanted for outcome in trials.holds]) for wanted in (True, False)
+    )
     inside, other = (np.array([interval.inside for interval in scale]) for scale in (first, second))
-    kept, wrong = ((inside & rows).astype(np.int64) @ other.T.astype(np.int64) for rows in (held, failed))
-    ends = np.add.outer([interval.ends for interval in first], [interval.ends for interval in second])
+    kept, wrong = (
+        (inside & rows).astype(np.int64) @ other.T.astype(np.int64) for rows in (held, failed)
+    )
+    ends = np.add.outer(
+        [interval.ends for interval in first], [interval.ends for interval in second]
+    )
     score = np.where(wrong == 0, _MOST_ENDS * kept - ends, -_MOST_ENDS)
     i, j = np.unravel_index(int(score.argmax()), score.shape)
     found = int(kept[i, j]) if wrong[i, j] == 0 else 0
-    return found, -int(ends[i, j]), tuple(interval for interval in (first[i], second[j]) if interval.ends)
+    return (
+        found,
+        -int(ends[i, j]),
+        tuple(interval for interval in (first[i], second[j]) if interval.ends),
+    )
 
 
 def _intervals(column: Column, trials: Table) -> list[_Interval]:
-    """All values of a condition and all intervals between two of them, including the unbounded one; empty if a value is
-    no number, or if there is only one value."""
+    """All values of a condition and all intervals between two of them, including the unbounded one;
+    empty if a value is no number, or if there is only one value."""
     values = trials.column(column.key)
     if not all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
         return []
@@ -168,7 +220,15 @@ def _intervals(column: Column, trials: Table) -> list[_Interval]:
     scale = math.log10 if seen[0] > 0 and seen[-1] / seen[0] >= _DECADES else float
     length = scale(seen[-1]) - scale(seen[0])
     return [
-        _Interval(column.key, column.unit, low if i or i == j else None, high if j < len(seen) - 1 or i == j else None,
-                  (scale(high) - scale(low)) / length, (places >= low) & (places <= high))
-        for i, low in enumerate(seen) for j, high in enumerate(seen) if i <= j
-    ]  # fmt: skip
+        _Interval(
+            column.key,
+            column.unit,
+            low if i or i == j else None,
+            high if j < len(seen) - 1 or i == j else None,
+            (scale(high) - scale(low)) / length,
+            (places >= low) & (places <= high),
+        )
+        for i, low in enumerate(seen)
+        for j, high in enumerate(seen)
+        if i <= j
+    ]

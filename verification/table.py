@@ -1,4 +1,5 @@
-"""Table: the rows of a study, the description of each column, and whether what is claimed holds in each row."""
+"""Table: the rows of a study, the description of each column, and whether what is claimed holds in
+each row."""
 
 from __future__ import annotations
 
@@ -22,7 +23,8 @@ class Column:
     key : name of the column, in code and in print; unit : empty if there is none
     condition : True if the study chooses the value, False if it measures it
     part : True if the rows with the same value form one part, which is judged separately
-    cases : True if the value counts the cases of a row, such as the impacts of a batch whose worst one is judged
+    cases : True if the value counts the cases of a row, such as the impacts of a batch whose worst
+        one is judged
     timed : True for a measured time or a value computed from one; it may differ in the next run
     prose : True for sentences; the numbers in them are compared through other tables
     """
@@ -45,7 +47,8 @@ class Column:
 class Table:
     """Rows of numbers, texts or None ("does not apply"), and the description of each column.
 
-    holds : whether the claim holds, one entry per row; None if the row cannot decide; empty if nothing is judged
+    holds : whether the claim holds, one entry per row; None if the row cannot decide; empty if
+        nothing is judged
     digits : significant digits in print; note : text printed below the table
     timed_rows : True if the selection of rows depends on measured times
     """
@@ -80,7 +83,9 @@ class Table:
 
     def where(self, **values: Any) -> Table:
         """Return the rows in which the named columns have these values."""
-        return self.only(all(row[key] == value for key, value in values.items()) for row in self.records())
+        return self.only(
+            all(row[key] == value for key, value in values.items()) for row in self.records()
+        )
 
     def that(self, outcome: bool | None) -> Table:
         """Return the rows with this outcome."""
@@ -129,7 +134,8 @@ class Table:
 
     @property
     def timed(self) -> tuple[str, ...]:
-        """Titles of the timed columns; the outcomes are included, since they may depend on any measured value."""
+        """Titles of the timed columns; the outcomes are included, since they may depend on any
+        measured value."""
         found = tuple(column.title for column in self.columns if column.timed)
         return (*found, HOLDS) if found and self.holds else found
 
@@ -140,10 +146,16 @@ class Table:
 
 
 def titled(
-    titles: Sequence[str], rows: Iterable[Sequence[Any]] = (), digits: int = 4, note: str = "",
-    timed: Collection[str] = (), timed_rows: bool = False, prose: Collection[str] = (),
+    titles: Sequence[str],
+    rows: Iterable[Sequence[Any]] = (),
+    digits: int = 4,
+    note: str = "",
+    timed: Collection[str] = (),
+    timed_rows: bool = False,
+    prose: Collection[str] = (),
 ) -> Table:
-    """Return a table from titles such as "step [ms]": the brackets hold the unit; the rest is the key.
+    """Return a table from titles such as "step [ms]": the brackets hold the unit; the rest is the
+    key.
 
     `timed` and `prose` list the titles of the timed columns and of the columns of sentences.
     """
@@ -155,21 +167,34 @@ def titled(
 
 
 def table_from(
-    rows: Iterable[Row], digits: int = 4, note: str = "", timed_rows: bool = False, **marks: Collection[str]
+    rows: Iterable[Row],
+    digits: int = 4,
+    note: str = "",
+    timed_rows: bool = False,
+    **marks: Collection[str],
 ) -> Table:
-    """Return a table of dictionaries whose keys carry the unit; they are the columns, in the order of appearance.
+    """Return a table of dictionaries whose keys carry the unit; they are the columns, in the order
+    of appearance.
 
     A row without a value has None in its place. `marks` are those of `column_of`.
     """
     given = list(rows)
-    titles = [title for title in dict.fromkeys(title for row in given for title in row) if title != HOLDS]
-    return Table(tuple(column_of(title, **marks) for title in titles),
-                 tuple(tuple(row.get(title) for title in titles) for row in given), (), digits, note, timed_rows)
+    titles = [
+        title for title in dict.fromkeys(title for row in given for title in row) if title != HOLDS
+    ]
+    return Table(
+        tuple(column_of(title, **marks) for title in titles),
+        tuple(tuple(row.get(title) for title in titles) for row in given),
+        (),
+        digits,
+        note,
+        timed_rows,
+    )
 
 
 def column_of(title: str, **marks: Collection[str]) -> Column:
-    """Return the column of a title such as "step [ms]". Each mark (`condition`, `part`, `timed` ...) lists the titles
-    or keys of the columns that have it."""
+    """Return the column of a title such as "step [ms]". Each mark (`condition`, `part`, `timed`
+    ...) lists the titles or keys of the columns that have it."""
     match = _UNIT.match(title)
     key, unit = (match["key"], match["unit"]) if match else (title, "")
     flags: dict[str, Any] = {mark: title in names or key in names for mark, names in marks.items()}
@@ -177,16 +202,23 @@ def column_of(title: str, **marks: Collection[str]) -> Column:
 
 
 def by_part(table: Table) -> dict[str, Table]:
-    """Return the rows of each part by the part's name; a table without parts has one part named ""."""
+    """Return the rows of each part by the part's name; a table without parts has one part named
+    ""."""
     marked = [column.key for column in table.columns if column.part]
     names = [", ".join(row[key] for key in marked) for row in table.records()]
-    return {part: table.only(name == part for name in names) for part in dict.fromkeys(names)} or {"": table}
+    return {part: table.only(name == part for name in names) for part in dict.fromkeys(names)} or {
+        "": table
+    }
 
 
 def ranges(table: Table) -> str:
-    """Return the conditions of a table in words: each with its values, or with its range if there are many."""
-    return "; ".join(f"{column.key.replace('_', ' ')} {span} {column.unit}".rstrip() for column in table.columns
-                     if column.condition and (span := _span(table.column(column.key))))  # fmt: skip
+    """Return the conditions of a table in words: each with its values, or with its range if there
+    are many."""
+    return "; ".join(
+        f"{column.key.replace('_', ' ')} {span} {column.unit}".rstrip()
+        for column in table.columns
+        if column.condition and (span := _span(table.column(column.key)))
+    )
 
 
 def _span(values: Sequence[Any]) -> str:

@@ -1,15 +1,20 @@
-"""Comparison of a scene in several worlds with one of them: distances over time, energy, penetration, time per step.
+"""Comparison of a scene in several worlds with one of them: distances over time, energy,
+penetration, time per step.
 
-There are three distances. Each uses the kinetic metric M(q) at the reference world's configuration and the scene's
-total mass m, so that joints and free bodies, metres and radians have comparable weights:
+There are three distances. Each uses the kinetic metric M(q) at the reference world's configuration
+and the scene's total mass m, so that joints and free bodies, metres and radians have comparable
+weights:
 
-    configuration  √(Δqᵀ M Δq / m)   [m]     root mean square displacement over all mass (to first order)
-    velocity       √(Δvᵀ M Δv / m)   [m/s]   root mean square velocity difference over all mass
-    impulse        √(m ΔPᵀ M⁻¹ ΔP)   [N s]   P is the sum of all contact impulses so far, since single contacts need not
-                                             be unique: their resultant if M is constant; otherwise the sum of
-                                             generalized impulses, each with the Jacobian of its own pose
+    configuration  √(Δqᵀ M Δq / m)   [m]     root mean square displacement over all mass (to first
+    order) velocity       √(Δvᵀ M Δv / m)   [m/s]   root mean square velocity difference over all
+    mass impulse        √(m ΔPᵀ M⁻¹ ΔP)   [N s]   P is the sum of all contact impulses so far, since
+    single contacts need not
+                                             be unique: their resultant if M is constant; otherwise
+                                             the sum of generalized impulses, each with the Jacobian
+                                             of its own pose
 
-Every complementarity solver then solves the scene's impacts in IAPB; recomputed residuals judge the answers.
+Every complementarity solver then solves the scene's impacts in IAPB; recomputed residuals judge the
+answers.
 """
 
 from __future__ import annotations
@@ -41,17 +46,30 @@ from reference.worlds import WORLDS, run_world
 from verification.complementarity.agreement import compare_cases
 from verification.complementarity.of_runs import impacts_of_run, problems_of_run
 from verification.complementarity.solvers import VERDICTS, ProblemStudy, study_read
-from verification.finding import MIXED, NOT_TESTABLE, REPRODUCED, Failure, Finding, Part, attempt, finding_of
+from verification.finding import (
+    MIXED,
+    NOT_TESTABLE,
+    REPRODUCED,
+    Failure,
+    Finding,
+    Part,
+    attempt,
+    finding_of,
+)
 from verification.table import Row, Table, table_from
 
 Progress = Callable[[str, int, int], None]
 Ran = tuple[Run, float]  # a run, and the processor time per step [s] without set-up
-Series = dict[str, Any]  # arrays of quantities over time, by their column; None where a run does not record them
+Series = dict[
+    str, Any
+]  # arrays of quantities over time, by their column; None where a run does not record them
 
 INSTANTS = 1000  # largest number of instants at which worlds are compared
 QUESTION = (
-    "The scene is simulated in each world. Distances from the reference world are in the kinetic metric, for the whole "
-    "mass: root mean square displacement and velocity of its particles, and the impulse of all contacts so far. "
+    "The scene is simulated in each world. Distances from the reference world are in the kinetic "
+    "metric, for the whole "
+    "mass: root mean square displacement and velocity of its particles, and the impulse of all "
+    "contacts so far. "
     "The impacts of IAPB are then given to every complementarity solver."
 )
 _UNITS = {"configuration": "m", "velocity": "m/s", "impulse": "N s"}  # of the three distances
@@ -60,36 +78,51 @@ _UNITS = {"configuration": "m", "velocity": "m/s", "impulse": "N s"}  # of the t
 def default_worlds(scene: Scene) -> tuple[str, ...]:
     """Return the default worlds of a scene.
 
-    Those with friction only if it has friction, CBuc only if it has gains, MuJoCo if installed and it ignores nothing.
+    Those with friction only if it has friction, CBuc only if it has gains, MuJoCo if installed and
+    it ignores nothing.
     """
     rough = scene.largest_friction > 0.0
     coupled = scene.hand is not None and scene.couplings.unilateral is not None
-    return ("IAPB", "PB", *(["IAPB-friction"] if rough else []), "ideal", *(["ideal-friction"] if rough else []),
-            *(["CBuc"] if coupled else []),
-            *(["mujoco"] if find_spec("mujoco") and not MuJoCo().ignored(scene) else []))
+    return (
+        "IAPB",
+        "PB",
+        *(["IAPB-friction"] if rough else []),
+        "ideal",
+        *(["ideal-friction"] if rough else []),
+        *(["CBuc"] if coupled else []),
+        *(["mujoco"] if find_spec("mujoco") and not MuJoCo().ignored(scene) else []),
+    )
 
 
 def compare_worlds(
-    scene: Scene | str | Path, worlds: Sequence[str] | None = None, against: str | None = None, *,
-    impacts: int = 12, progress: Progress | None = None,
+    scene: Scene | str | Path,
+    worlds: Sequence[str] | None = None,
+    against: str | None = None,
+    *,
+    impacts: int = 12,
+    progress: Progress | None = None,
 ) -> Finding:
     """Simulate a scene in several worlds and compare each with one of them.
 
     Parameters
     ----------
-    scene : a validated scene, the path of a scene file, or the name of a scene that comes with the project
-    worlds : names of worlds as `iapb.worlds.find_world` takes them; default: IAPB, PB and ideal; if the scene has
-        friction, also IAPB-friction and ideal-friction; if the scene gives gains of the unilateral coupler, also CBuc;
-        mujoco if it is installed and its model lacks nothing that the scene has
-    against : the reference world of the comparison; default: ideal, or ideal-friction if the scene has friction
+    scene : a validated scene, the path of a scene file, or the name of a scene that comes with the
+        project
+    worlds : names of worlds as `iapb.worlds.find_world` takes them; default: IAPB, PB and ideal; if
+        the scene has friction, also IAPB-friction and ideal-friction; if the scene gives gains of
+        the unilateral coupler, also CBuc; mujoco if it is installed and its model lacks nothing
+        that the scene has
+    against : the reference world of the comparison; default: ideal, or ideal-friction if the scene
+        has friction
     impacts : largest number of impacts, spread over the motion, for all solvers; 0 for none
     progress : called as progress(stage, done, total)
 
     Returns
     -------
     Finding
-        Its tables are "worlds" (one row per world), "over time", and, if there are impacts, "solvers" and "problems".
-        The answer ranks the worlds whose runs are complete and trustworthy, and names the others with the reason.
+        Its tables are "worlds" (one row per world), "over time", and, if there are impacts,
+        "solvers" and "problems". The answer ranks the worlds whose runs are complete and
+        trustworthy, and names the others with the reason.
 
     Raises
     ------
@@ -101,57 +134,105 @@ def compare_worlds(
     say = progress or (lambda *_: None)
     names, against = _chosen(scene, worlds, against)
     failures: list[Failure] = []
-    runs = {name: found for name in names
-            if (found := attempt(f"world {name}", partial(_run, scene, name, say), failures)) is not None}
+    runs = {
+        name: found
+        for name in names
+        if (found := attempt(f"world {name}", partial(_run, scene, name, say), failures))
+        is not None
+    }
     if against not in runs:
         reason = next((one.reason for one in failures if one.case == f"world {against}"), "")
-        raise IapbError(f"{scene.name} cannot be simulated in the reference world {against}: {reason}; "
-                        "choose another with `against`")
+        raise IapbError(
+            f"{scene.name} cannot be simulated in the reference world {against}: {reason}; "
+            "choose another with `against`"
+        )
     mechanism = mechanism_of(scene)
-    impulse = ("resultant of all contacts" if mechanism.has_constant_mass_matrix
-               else "generalized, no resultant: M(q) varies")
+    impulse = (
+        "resultant of all contacts"
+        if mechanism.has_constant_mass_matrix
+        else "generalized, no resultant: M(q) varies"
+    )
     unfit = {name: why for name, (run, _) in runs.items() if (why := _unfit(scene, run))}
     series = {name: _series(mechanism, run, runs[against][0]) for name, (run, _) in runs.items()}
     fastest = min(seconds for _, seconds in runs.values())
     tables = {
         "worlds": table_from(
-            [_world(name, ran, None if name == against else series[name], fastest) for name, ran in runs.items()], 3,
-            f"Distances from {against}, in the kinetic metric for the whole mass, at {INSTANTS} instants at most. "
-            f"Impulse: {impulse}. Lost: start and work done, minus the end. The time is the processor's, without "
-            "set-up.", timed=("time per step", "times the fastest")),
-        "over time": table_from({"world": name, **dict(zip(found, row, strict=True))}
-                                for name, found in series.items() for row in _rows_of(found)),
-    }  # fmt: skip
+            [
+                _world(name, ran, None if name == against else series[name], fastest)
+                for name, ran in runs.items()
+            ],
+            3,
+            f"Distances from {against}, in the kinetic metric for the whole mass, at {INSTANTS} "
+            f"instants at most. "
+            f"Impulse: {impulse}. Lost: start and work done, minus the end. The time is the "
+            f"processor's, without "
+            "set-up.",
+            timed=("time per step", "times the fastest"),
+        ),
+        "over time": table_from(
+            {"world": name, **dict(zip(found, row, strict=True))}
+            for name, found in series.items()
+            for row in _rows_of(found)
+        ),
+    }
     fit = len(runs) - len(unfit)
-    said = f"{fit} of {len(runs)} worlds ran to the end of {scene.duration:g} s and are to be trusted"
+    said = (
+        f"{fit} of {len(runs)} worlds ran to the end of {scene.duration:g} s and are to be trusted"
+    )
     said += "".join(f"; {name} {why}" for name, why in unfit.items())
     parts = [Part(f"{said}.", MIXED if unfit else REPRODUCED, "runs", fit, len(runs))]
     if impacts:
         struck = runs["IAPB"][0] if "IAPB" in runs else run_world(scene, "IAPB", partial=True)
-        judged = attempt("impacts", partial(compare_impacts, struck, scene, impacts, say, failures), failures)
+        judged = attempt(
+            "impacts", partial(compare_impacts, struck, scene, impacts, say, failures), failures
+        )
         parts, tables = (parts + judged[0], tables | judged[1]) if judged else (parts, tables)
-    finding = finding_of(f"worlds of {scene.name}", scene.title or scene.name, QUESTION,
-                         _answer(runs, series, against, unfit), parts, tables, failures)
-    return replace(finding, details={"scene": scene.name, "worlds": ", ".join(runs), "against": against,
-                                     "impulse": impulse})
+    finding = finding_of(
+        f"worlds of {scene.name}",
+        scene.title or scene.name,
+        QUESTION,
+        _answer(runs, series, against, unfit),
+        parts,
+        tables,
+        failures,
+    )
+    return replace(
+        finding,
+        details={
+            "scene": scene.name,
+            "worlds": ", ".join(runs),
+            "against": against,
+            "impulse": impulse,
+        },
+    )
 
 
-def _chosen(scene: Scene, worlds: Sequence[str] | None, against: str | None) -> tuple[tuple[str, ...], str]:
-    """Return the worlds in order, each once and including the reference world, and the name of the reference world."""
+def _chosen(
+    scene: Scene, worlds: Sequence[str] | None, against: str | None
+) -> tuple[tuple[str, ...], str]:
+    """Return the worlds in order, each once and including the reference world, and the name of the
+    reference world."""
     if isinstance(worlds, str):
         worlds = worlds.split(",")
-    names = tuple(dict.fromkeys(name.strip() for name in worlds)) if worlds else default_worlds(scene)
+    names = (
+        tuple(dict.fromkeys(name.strip() for name in worlds)) if worlds else default_worlds(scene)
+    )
     if against is None:
         wanted = "ideal-friction" if scene.largest_friction > 0.0 else "ideal"
-        against = wanted if worlds is None or wanted in names else "ideal" if "ideal" in names else wanted
+        against = (
+            wanted if worlds is None or wanted in names else "ideal" if "ideal" in names else wanted
+        )
     for argument, name in [*(("worlds", name) for name in names), ("against", against)]:
         if name not in WORLDS and ":" not in name:
-            raise ArgumentError(argument, name, f"{one_of(name, WORLDS)}, or your engine as module:engine")
+            raise ArgumentError(
+                argument, name, f"{one_of(name, WORLDS)}, or your engine as module:engine"
+            )
     return (*names, *([against] if against not in names else [])), against
 
 
 def _run(scene: Scene, world: str, say: Progress) -> Ran:
-    """Simulate the scene; the clock is read at the end of each chunk, which excludes the setup of the first chunk."""
+    """Simulate the scene; the clock is read at the end of each chunk, which excludes the setup of
+    the first chunk."""
     clock: list[tuple[int, float]] = []
 
     def progress(done: int, total: int) -> None:
@@ -169,7 +250,9 @@ def _run(scene: Scene, world: str, say: Progress) -> Ran:
 
 def _series(mechanism: Mechanism, run: Run, reference: Run) -> Series:
     """Return all compared quantities over time, at the instants that both runs have."""
-    at = np.unique(np.linspace(0, reference.steps, min(reference.steps, INSTANTS) + 1).round().astype(np.int64))
+    at = np.unique(
+        np.linspace(0, reference.steps, min(reference.steps, INSTANTS) + 1).round().astype(np.int64)
+    )
     at = at[at <= run.steps]
     q, v = reference.q[at], reference.v[at]
     mass, whole = mechanism.mass_matrices(q), float(mechanism.arrays.mass.sum())
@@ -177,19 +260,29 @@ def _series(mechanism: Mechanism, run: Run, reference: Run) -> Series:
     forms: dict[str, Floats | None] = {
         "configuration": np.einsum("ki,kij,kj->k", moved, mass, moved) / whole,
         "velocity": np.einsum("ki,kij,kj->k", run.v[at] - v, mass, run.v[at] - v) / whole,
-        "impulse": None}
+        "impulse": None,
+    }
     if run.records_contacts and reference.records_contacts:
         given = _given(run)[at] - _given(reference)[at]
         answer = np.linalg.solve(mass, given[:, :, None])[:, :, 0]
         forms["impulse"] = np.einsum("ki,ki->k", given, answer) * whole
-    depth, steps = np.zeros(run.steps + 1), np.repeat(np.arange(run.steps), np.diff(run.contacts.offsets))
+    depth, steps = (
+        np.zeros(run.steps + 1),
+        np.repeat(np.arange(run.steps), np.diff(run.contacts.offsets)),
+    )
     np.maximum.at(depth, steps + 1, -run.contacts.gap)
-    since = np.minimum(np.concatenate([[0], at[:-1] + 1]), run.steps)  # the deepest since the previous instant
-    return {"time [s]": run.time[at],
-            **{f"{name} [{_UNITS[name]}]": None if form is None else np.sqrt(np.maximum(form, 0.0))
-               for name, form in forms.items()},
-            "energy [J]": run.energy["kinetic"][at] + run.energy["potential"][at],
-            "penetration [m]": np.maximum.reduceat(depth, since) if run.records_contacts else None}
+    since = np.minimum(
+        np.concatenate([[0], at[:-1] + 1]), run.steps
+    )  # the deepest since the previous instant
+    return {
+        "time [s]": run.time[at],
+        **{
+            f"{name} [{_UNITS[name]}]": None if form is None else np.sqrt(np.maximum(form, 0.0))
+            for name, form in forms.items()
+        },
+        "energy [J]": run.energy["kinetic"][at] + run.energy["potential"][at],
+        "penetration [m]": np.maximum.reduceat(depth, since) if run.records_contacts else None,
+    }
 
 
 def _rows_of(found: Series) -> Iterator[tuple[float | None, ...]]:
@@ -213,24 +306,44 @@ def _world(name: str, ran: Ran, apart: Series | None, fastest: float) -> Row:
         for which in ("rms", "most", "end"):
             far[f"{key}, {which} [{unit}]"] = None if values is None else _sizes(values)[which]
     books: dict[str, float | None] = dict.fromkeys(
-        ("work done [J]", "energy lost [J]", "most above start and work [J]"))
-    if run.coupling != "unilateral":  # that coupler moves the tool at times, so there is no energy balance
-        work = np.concatenate([[0.0], run.energy["hand_work"] + run.energy.get("coupling_work", 0.0)])
+        ("work done [J]", "energy lost [J]", "most above start and work [J]")
+    )
+    if (
+        run.coupling != "unilateral"
+    ):  # that coupler moves the tool at times, so there is no energy balance
+        work = np.concatenate(
+            [[0.0], run.energy["hand_work"] + run.energy.get("coupling_work", 0.0)]
+        )
         total = run.energy["kinetic"] + run.energy["potential"]
         above = total - total[0] - work
-        books = dict(zip(books, (float(work[-1]), 0.0 - float(above[-1]), float(above.max())), strict=True))
+        books = dict(
+            zip(books, (float(work[-1]), 0.0 - float(above[-1]), float(above.max())), strict=True)
+        )
     touching = run.records_contacts
-    return {"world": name, "law": run.law, "ignores": ", ".join(ignored_fields(run.effects)) or None,
-            "simulated until [s]": float(run.time[-1]), **far,
-            "kinetic energy at the end [J]": float(run.energy["kinetic"][-1]), **books,
-            "deepest overlap [mm]": 1e3 * max(0.0, -float(run.contacts.gap.min(initial=0.0))) if touching else None,
-            "impacts": len(run.impacts.step) if touching else None, "time per step [µs]": 1e6 * seconds,
-            "times the fastest": seconds / fastest}
+    return {
+        "world": name,
+        "law": run.law,
+        "ignores": ", ".join(ignored_fields(run.effects)) or None,
+        "simulated until [s]": float(run.time[-1]),
+        **far,
+        "kinetic energy at the end [J]": float(run.energy["kinetic"][-1]),
+        **books,
+        "deepest overlap [mm]": 1e3 * max(0.0, -float(run.contacts.gap.min(initial=0.0)))
+        if touching
+        else None,
+        "impacts": len(run.impacts.step) if touching else None,
+        "time per step [µs]": 1e6 * seconds,
+        "times the fastest": seconds / fastest,
+    }
 
 
 def _sizes(values: Floats) -> dict[str, float]:
     """Root mean square, largest and last value."""
-    return {"rms": float(np.sqrt(np.mean(values**2))), "most": float(values.max()), "end": float(values[-1])}
+    return {
+        "rms": float(np.sqrt(np.mean(values**2))),
+        "most": float(values.max()),
+        "end": float(values[-1]),
+    }
 
 
 def _unfit(scene: Scene, run: Run) -> str:
@@ -243,27 +356,42 @@ def _unfit(scene: Scene, run: Run) -> str:
     return f"not to be trusted: {'; '.join(run.distrust)}" if run.distrust else ""
 
 
-def _answer(runs: dict[str, Ran], series: dict[str, Series], against: str, unfit: dict[str, str]) -> str:
-    """Return which world is closest to the reference, and how close, among the worlds fit for the comparison."""
+def _answer(
+    runs: dict[str, Ran], series: dict[str, Series], against: str, unfit: dict[str, str]
+) -> str:
+    """Return which world is closest to the reference, and how close, among the worlds fit for the
+    comparison."""
     if len(series) == 1:
         return f"Only {against} was simulated."
     if against in unfit:
         return f"No world is called closest: the reference {against} {unfit[against]}."
-    far = {name: _sizes(found["configuration [m]"]) for name, found in series.items()
-           if name != against and name not in unfit}
-    left_out = f" Not ranked: {'; '.join(f'{name} {why}' for name, why in unfit.items())}." if unfit else ""
+    far = {
+        name: _sizes(found["configuration [m]"])
+        for name, found in series.items()
+        if name != against and name not in unfit
+    }
+    left_out = (
+        f" Not ranked: {'; '.join(f'{name} {why}' for name, why in unfit.items())}."
+        if unfit
+        else ""
+    )
     if not far:
         return f"No world can be compared with {against}.{left_out}"
     closest = min(far, key=lambda name: far[name]["rms"])
     ratio = runs[against][1] / runs[closest][1]
     speed = f"{ratio:.3g} times as fast" if ratio >= 1.0 else f"{1.0 / ratio:.3g} times as slow"
-    return (f"Closest to {against} is {closest}: {1e3 * far[closest]['rms']:.3g} mm apart (rms over mass and time), "
-            f"{1e3 * far[closest]['most']:.3g} mm at most; its step is {speed}.{left_out}")
+    return (
+        f"Closest to {against} is {closest}: {1e3 * far[closest]['rms']:.3g} mm apart (rms over "
+        f"mass and time), "
+        f"{1e3 * far[closest]['most']:.3g} mm at most; its step is {speed}.{left_out}"
+    )
 
 
 # The impacts of IAPB as complementarity problems, with and without friction, for every solver.
 LONGEST = 0.4  # [s] a solver that takes longer on one impact skips larger ones
-CASES = 200  # largest number of impacts for which IAPB's motion is compared with that of the Newton LCP
+CASES = (
+    200  # largest number of impacts for which IAPB's motion is compared with that of the Newton LCP
+)
 
 
 def compare_impacts(
@@ -276,43 +404,69 @@ def compare_impacts(
         said = f"No impact of {scene.name} can be given to solvers: {why}."
         return [Part(said, NOT_TESTABLE, "impacts", optional=True)], {}
     stored = [StoredProblem(problem) for problem in problems]
-    study = study_read(f"impacts of {scene.name}", stored, longest=LONGEST, progress=progress, failures=failures)
+    study = study_read(
+        f"impacts of {scene.name}", stored, longest=LONGEST, progress=progress, failures=failures
+    )
     # IAPB's impacts equal those of the Newton LCP if all contacts push
     compared = compare_cases(impacts_of_run(run, scene)[0][:CASES], failures=failures)
     agree, push = (sum(one[key] for one in compared) for key in ("agrees", "pushes"))
-    moves = (f"IAPB moves as the frictionless Newton LCP in {agree} of its {len(compared)} impacts; in "
-             f"{len(compared) - push} an impulse pulls. The largest distance is "
-             f"{max(one['distance'] for one in compared):.2g} of |v⁻|.")
+    moves = (
+        f"IAPB moves as the frictionless Newton LCP in {agree} of its {len(compared)} impacts; in "
+        f"{len(compared) - push} an impulse pulls. The largest distance is "
+        f"{max(one['distance'] for one in compared):.2g} of |v⁻|."
+    )
     verdict = REPRODUCED if agree == len(compared) else MIXED
     return [Part(moves, verdict, "motion", agree, len(compared)), _solved(study)], {
         "solvers": table_from(
-            [_solver(study, name) for name in study.solvers], 3,
+            [_solver(study, name) for name in study.solvers],
+            3,
             "Residuals are recomputed from the problem, relative to its velocities; solved: at most 1e-6.",
-            timed=("median time", "left out")),
+            timed=("median time", "left out"),
+        ),
         "problems": table_from(_problems(study), 3, timed=("time", "note")),
-    }  # fmt: skip
+    }
 
 
 def _solved(study: ProblemStudy) -> Part:
-    """Return the part on correct answers and on solvers with wrong ones; a refusal or an error is no answer."""
+    """Return the part on correct answers and on solvers with wrong ones; a refusal or an error is
+    no answer."""
     solved = sum(row.verdict == "solved" for row in study.rows)
-    wrong = Counter(row.solver for row in study.rows if row.verdict == "failed" and np.isfinite(row.residuals.worst))
-    answers, unsolved = solved + wrong.total(), sum("solved" not in line.values() for line in study.lines)
-    sentence = (f"{solved} of {answers} answers are solutions, by residuals recomputed from the problem; "
-                f"{len(study.lines) - unsolved} of {len(study.lines)} problems have one.")
+    wrong = Counter(
+        row.solver
+        for row in study.rows
+        if row.verdict == "failed" and np.isfinite(row.residuals.worst)
+    )
+    answers, unsolved = (
+        solved + wrong.total(),
+        sum("solved" not in line.values() for line in study.lines),
+    )
+    sentence = (
+        f"{solved} of {answers} answers are solutions, by residuals recomputed from the problem; "
+        f"{len(study.lines) - unsolved} of {len(study.lines)} problems have one."
+    )
     if wrong:
-        sentence += f" Wrong answers: {', '.join(f'{solver} {count}' for solver, count in wrong.items())}."
-    return Part(sentence, MIXED if unsolved or wrong else REPRODUCED, "solvers", solved, answers, timed=True)
+        sentence += (
+            f" Wrong answers: {', '.join(f'{solver} {count}' for solver, count in wrong.items())}."
+        )
+    return Part(
+        sentence, MIXED if unsolved or wrong else REPRODUCED, "solvers", solved, answers, timed=True
+    )
 
 
 def _solver(study: ProblemStudy, name: str) -> Row:
     mine = [row for row in study.rows if row.solver == name]
     solved = [row for row in mine if row.verdict == "solved"]
-    return {"solver": name, "friction": "friction" if SOLVERS[name].takes == "cone" else "none", "problems": len(mine),
-            **{verdict: sum(row.verdict == verdict for row in mine) for verdict in VERDICTS},
-            "worst residual": max((row.residuals.worst for row in solved), default=None),
-            "spread of velocities": max((row.spread for row in solved), default=None),
-            "median time [µs]": float(np.median([1e6 * row.seconds for row in solved])) if solved else None}
+    return {
+        "solver": name,
+        "friction": "friction" if SOLVERS[name].takes == "cone" else "none",
+        "problems": len(mine),
+        **{verdict: sum(row.verdict == verdict for row in mine) for verdict in VERDICTS},
+        "worst residual": max((row.residuals.worst for row in solved), default=None),
+        "spread of velocities": max((row.spread for row in solved), default=None),
+        "median time [µs]": float(np.median([1e6 * row.seconds for row in solved]))
+        if solved
+        else None,
+    }
 
 
 def _problems(study: ProblemStudy) -> list[Row]:
@@ -322,7 +476,17 @@ def _problems(study: ProblemStudy) -> list[Row]:
     def known(value: float) -> float | None:
         return float(value) if np.isfinite(value) else None
 
-    return [{"problem": row.problem, "unknowns": size[row.problem]["unknowns"], "rank": size[row.problem]["rank"],
-             "solver": row.solver, "outcome": row.verdict, "worst residual": known(row.residuals.worst),
-             "spread of velocities": known(row.spread), "time [µs]": known(1e6 * row.seconds), "note": row.note}
-            for row in study.rows]
+    return [
+        {
+            "problem": row.problem,
+            "unknowns": size[row.problem]["unknowns"],
+            "rank": size[row.problem]["rank"],
+            "solver": row.solver,
+            "outcome": row.verdict,
+            "worst residual": known(row.residuals.worst),
+            "spread of velocities": known(row.spread),
+            "time [µs]": known(1e6 * row.seconds),
+            "note": row.note,
+        }
+        for row in study.rows
+    ]

@@ -1,1 +1,2 @@
-"""Advice: which effects a scene needs, warnings before a run, distrust after it, exact certificates of impacts."""
+"""Advice: which effects a scene needs, warnings before a run, distrust after it, exact certificates
+of impacts."""

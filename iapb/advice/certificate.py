@@ -1,9 +1,10 @@
 """Certify from M, v⁻ and v⁺ whether a recorded impact gained kinetic energy in exact arithmetic.
 
-Every double is an integer times a power of two, so integer arithmetic decides exactly whether v⁺ᵀMv⁺ ≤ v⁻ᵀMv⁻.
-A proved error bound in double-double (`iapb.contact.kernels.passive`) decides almost every impact. Integer arithmetic
-decides the impacts whose sign the bound leaves open, and confirms the bound for one impact in a hundred. The recorded
-energies are not used, so impacts of other engines are judged in the same way.
+Every double is an integer times a power of two, so integer arithmetic decides exactly whether
+v⁺ᵀMv⁺ ≤ v⁻ᵀMv⁻. A proved error bound in double-double (`iapb.contact.kernels.passive`) decides
+almost every impact. Integer arithmetic decides the impacts whose sign the bound leaves open, and
+confirms the bound for one impact in a hundred. The recorded energies are not used, so impacts of
+other engines are judged in the same way.
 """
 
 from __future__ import annotations
@@ -27,17 +28,23 @@ from iapb.scene.mechanism import mechanism_of, pairs_of, restitutions_of, shapes
 from iapb.scene.reading import scene_from_values
 from iapb.schema import Booleans, Floats, Integers
 
-Batch = tuple[Floats, Floats, Floats, Floats | None]  # M (n or 1, d, d), v⁻, v⁺ (n, d), and M (v⁺ − v⁻) as recorded
+Batch = tuple[
+    Floats, Floats, Floats, Floats | None
+]  # M (n or 1, d, d), v⁻, v⁺ (n, d), and M (v⁺ − v⁻) as recorded
 
 EXPORT_HEAD = "iapb impacts 2"  # first line of a file of exported impacts
 _CHECKED = 100  # integers confirm one in so many of the impacts that the bound decides
 _BATCH = 4096  # impacts whose mass matrices are in memory at once
 _STEPS = 1 << 16  # steps of a run that are in memory at once
 _PIECE, _ROWS = 1 << 26, 1 << 20  # bytes of its states, and rows of its contacts, likewise
-_INDEFINITE = 1e-12  # a negative eigenvalue of M beyond this share of the largest one is no rounding
-# In a correct record, M (v⁺ − v⁻) and Jᵀp of the recorded contacts equal the recorded impulse up to rounding.
+_INDEFINITE = (
+    1e-12  # a negative eigenvalue of M beyond this share of the largest one is no rounding
+)
+# In a correct record, M (v⁺ − v⁻) and Jᵀp of the recorded contacts equal the recorded impulse up to
+# rounding.
 MOMENTUM_TOLERANCE = 1e-9
-# The resolver drops rows within 1e-10 of the span of others; their residual is √κ(M) times larger: 1e-6 at κ(M) = 1e8.
+# The resolver drops rows within 1e-10 of the span of others; their residual is √κ(M) times larger:
+# 1e-6 at κ(M) = 1e8.
 RESTITUTION_TOLERANCE = 1e-6
 
 
@@ -47,23 +54,28 @@ class Certificate:
 
     Attributes
     ----------
-    impacts : number of impacts judged.  gains : number of these that gained kinetic energy, even in the last bit.
-    by_integers : number of impacts that the floating-point bound could not decide and integer arithmetic did.
+    impacts : number of impacts judged.  gains : number of these that gained kinetic energy, even in
+        the last bit.
+    by_integers : number of impacts that the floating-point bound could not decide and integer
+        arithmetic did.
     checked : number of bounds confirmed by integer arithmetic.
     first_gain : index of the first impact that gained, −1 = none.
     largest_gain : largest relative gain (KE⁺ − KE⁻)/KE⁻, 0 if none gained.
-    momentum : largest |M(v⁺ − v⁻) − recorded impulse|, relative to the sum of |M||v⁺ − v⁻| and the recorded
-        impulse; NaN if no impulse is recorded.
-    span : largest |Jᵀp − recorded impulse|, relative to the sum of both sizes. J and p hold the normals and impulses of
-        the recorded contacts, so this is the distance of the impulse from range(Jᵀ). NaN with friction in impacts or
-        per-body rows.
-    total : largest |sum of the impulses of a step's impacts − the step's recorded impulse|, relative to the sum of
-        their sizes. It is 1 if a step has an impulse and no impact, and NaN if no steps are recorded.
-    restitution : largest |J v⁺ + e J v⁻| of the contacts with an impulse, relative to |J||v⁻|; NaN if the law does not
-        require J v⁺ = −e J v⁻.
-    restitution_judged : whether a large restitution residual makes the certificate fail. This holds for law (21)
-        without options, one scalar e, and only independent rows. Otherwise the residual is only reported.
-    counterexample : Python source, ready to paste, that shows the first gain in rationals; empty if there is no gain.
+    momentum : largest |M(v⁺ − v⁻) − recorded impulse|, relative to the sum of |M||v⁺ − v⁻| and the
+        recorded impulse; NaN if no impulse is recorded.
+    span : largest |Jᵀp − recorded impulse|, relative to the sum of both sizes. J and p hold the
+        normals and impulses of the recorded contacts, so this is the distance of the impulse from
+        range(Jᵀ). NaN with friction in impacts or per-body rows.
+    total : largest |sum of the impulses of a step's impacts − the step's recorded impulse|,
+        relative to the sum of their sizes. It is 1 if a step has an impulse and no impact, and NaN
+        if no steps are recorded.
+    restitution : largest |J v⁺ + e J v⁻| of the contacts with an impulse, relative to |J||v⁻|; NaN
+        if the law does not require J v⁺ = −e J v⁻.
+    restitution_judged : whether a large restitution residual makes the certificate fail. This holds
+        for law (21) without options, one scalar e, and only independent rows. Otherwise the
+        residual is only reported.
+    counterexample : Python source, ready to paste, that shows the first gain in rationals; empty if
+        there is no gain.
     """
 
     impacts: int
@@ -82,14 +94,19 @@ class Certificate:
     @property
     def _shares(self) -> dict[str, float]:
         """Residual over tolerance of each condition other than energy; NaN if it is not judged."""
-        return {"momentum M(v⁺ − v⁻)": self.momentum / MOMENTUM_TOLERANCE,
-                "impulses in range(Jᵀ)": self.span / MOMENTUM_TOLERANCE,
-                "sum of a step's impulses": self.total / MOMENTUM_TOLERANCE,
-                "restitution": self.restitution / RESTITUTION_TOLERANCE if self.restitution_judged else np.nan}
+        return {
+            "momentum M(v⁺ − v⁻)": self.momentum / MOMENTUM_TOLERANCE,
+            "impulses in range(Jᵀ)": self.span / MOMENTUM_TOLERANCE,
+            "sum of a step's impulses": self.total / MOMENTUM_TOLERANCE,
+            "restitution": self.restitution / RESTITUTION_TOLERANCE
+            if self.restitution_judged
+            else np.nan,
+        }
 
     @property
     def passed(self) -> bool:
-        """No impact gained energy, and every judged residual is within its tolerance (NaN: not judged)."""
+        """No impact gained energy, and every judged residual is within its tolerance (NaN: not
+        judged)."""
         return self.gains == 0 and not any(share > 1.0 for share in self._shares.values())
 
     def words(self) -> str:
@@ -97,30 +114,47 @@ class Certificate:
         shares = self._shares.items()
         wrong = [name for name, share in shares if share > 1.0]
         if not self.impacts:
-            return f"no impact, and what is recorded does not fit: {', '.join(wrong)}" if wrong else \
-                "no impact: nothing to certify"
-        energy = f"{self.gains} of {self.impacts} impacts gained energy" if self.gains else \
-            f"none of {self.impacts} impacts gained energy, not in the last bit"
+            return (
+                f"no impact, and what is recorded does not fit: {', '.join(wrong)}"
+                if wrong
+                else "no impact: nothing to certify"
+            )
+        energy = (
+            f"{self.gains} of {self.impacts} impacts gained energy"
+            if self.gains
+            else f"none of {self.impacts} impacts gained energy, not in the last bit"
+        )
         held = ["no gain"] * (not self.gains) + [name for name, share in shares if share <= 1.0]
         reported = " (only reported)" * (not np.isnan(self.restitution))
-        open_ = [name + reported * (name == "restitution") for name, share in shares if np.isnan(share)]
+        open_ = [
+            name + reported * (name == "restitution") for name, share in shares if np.isnan(share)
+        ]
         fits = f" Recorded impulses and velocities do not fit: {'; '.join(wrong)}." if wrong else ""
-        springs = " Springs return stored energy: judge such a contact from first touch to last." * bool(self.gains)
-        return (f"{energy} (exact).{springs} Certified: {'; '.join(held) or 'nothing'}.{fits} "
-                f"Not judged: {'; '.join([*open_, 'forces between impacts'])}.")
+        springs = (
+            " Springs return stored energy: judge such a contact from first touch to last."
+            * bool(self.gains)
+        )
+        return (
+            f"{energy} (exact).{springs} Certified: {'; '.join(held) or 'nothing'}.{fits} "
+            f"Not judged: {'; '.join([*open_, 'forces between impacts'])}."
+        )
 
     __str__ = words
 
 
 def exact_gain(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -> Fraction:
     """KE⁺ − KE⁻ = ½ (v⁺ᵀMv⁺ − v⁻ᵀMv⁻) as a rational number."""
-    (M, unit), (v, speed_unit) = _integers(mass_matrix), _integers(np.array([v_minus, v_plus], np.float64))
+    (M, unit), (v, speed_unit) = (
+        _integers(mass_matrix),
+        _integers(np.array([v_minus, v_plus], np.float64)),
+    )
     total = v[1] @ M @ v[1] - v[0] @ M @ v[0]
     return Fraction(total) * Fraction(2) ** (unit + 2 * speed_unit - 1)
 
 
 def _integers(values: ArrayLike) -> tuple[NDArray[np.object_], int]:
-    """Return integers of any length and one exponent such that values = integers · 2^exponent exactly."""
+    """Return integers of any length and one exponent such that values = integers · 2^exponent
+    exactly."""
     mantissas, exponents = np.frexp(_finite("velocity or mass_matrix", values))
     whole = (mantissas * 2.0**53).astype(np.int64)
     least = int(exponents[whole != 0].min(initial=0))
@@ -157,7 +191,8 @@ def _impacts(mass_matrix: ArrayLike, v_minus: ArrayLike, **others: ArrayLike) ->
 
 
 class Judged(NamedTuple):
-    """The exact answers `gained` (n,), and the numbers of impacts that integers decided and confirmed."""
+    """The exact answers `gained` (n,), and the numbers of impacts that integers decided and
+    confirmed."""
 
     gained: Booleans
     by_integers: int
@@ -165,7 +200,8 @@ class Judged(NamedTuple):
 
 
 def judge_gains(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -> Judged:
-    """Return for each of n impacts whether it gained kinetic energy, from M (d, d) or (n, d, d), v⁻ and v⁺ (n, d).
+    """Return for each of n impacts whether it gained kinetic energy, from M (d, d) or (n, d, d), v⁻
+    and v⁺ (n, d).
 
     Raises
     ------
@@ -178,22 +214,30 @@ def judge_gains(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -
 def _judged(masses: Floats, before: Floats, after: Floats) -> Judged:
     signs = np.empty(len(before), np.int64)
     gain_signs(masses, before, after, signs)
-    gained, unsure, checked = signs > 0, np.flatnonzero(signs == 0), np.flatnonzero(signs)[::_CHECKED]
+    gained, unsure, checked = (
+        signs > 0,
+        np.flatnonzero(signs == 0),
+        np.flatnonzero(signs)[::_CHECKED],
+    )
     for k in (*unsure, *checked):
         gains = exact_gain(masses[k % len(masses)], before[k], after[k]) > 0
         if signs[k] and gains != gained[k]:
-            raise IapbError(f"impact {k}: an error of iapb: the exact energy is outside its double-double bounds")
+            raise IapbError(
+                f"impact {k}: an error of iapb: the exact energy is outside its double-double bounds"
+            )
         gained[k] = gains
     return Judged(gained, len(unsure), len(checked))
 
 
 def certify(run: Run) -> Certificate:
-    """Judge the energy of every impact of a run exactly, and check impulses, velocities and contacts for consistency.
+    """Judge the energy of every impact of a run exactly, and check impulses, velocities and
+    contacts for consistency.
 
-    The engine's kernels compute M again from the recorded q; they give the same bits on every x86-64 processor. The
-    digest in the record is that of M computed in this way after the run, not of the M inside the step. If the digests
-    agree, then q, scene and kernels are those of the recording. The recorded generalized impulse must equal
-    M(v⁺ − v⁻) within `MOMENTUM_TOLERANCE`; this shows that M is the mass matrix of the impact.
+    The engine's kernels compute M again from the recorded q; they give the same bits on every
+    x86-64 processor. The digest in the record is that of M computed in this way after the run, not
+    of the M inside the step. If the digests agree, then q, scene and kernels are those of the
+    recording. The recorded generalized impulse must equal M(v⁺ − v⁻) within `MOMENTUM_TOLERANCE`;
+    this shows that M is the mass matrix of the impact.
 
     Parameters
     ----------
@@ -215,8 +259,12 @@ def certify(run: Run) -> Certificate:
         raise ArgumentError("impacts.step", step.max(), f"steps from 0 to {len(run.impulse) - 1}")
     if (np.diff(step) < 0).any():
         raise ArgumentError("impacts.step", step, "steps that never fall")
-    silent = run.law not in ENGINE_LAWS and not any(  # another world may not record impulses of contacts
-        piece.contacts.impulse.any() for piece in _pieces(run, step))
+    silent = (
+        run.law not in ENGINE_LAWS
+        and not any(  # another world may not record impulses of contacts
+            piece.contacts.impulse.any() for piece in _pieces(run, step)
+        )
+    )
     residuals: list[tuple[float, float, float]] = []  # total, span and restitution of each piece
 
     def batches() -> Iterator[Batch]:
@@ -226,28 +274,55 @@ def certify(run: Run) -> Certificate:
 
     found = _certificate(batches())
     total, span, restitution = np.fmax.reduce(residuals).tolist()
-    every_row = bool(np.all(run.impacts.rank[:] >= run.impacts.rows[:]))  # else some depend on others
+    every_row = bool(
+        np.all(run.impacts.rank[:] >= run.impacts.rows[:])
+    )  # else some depend on others
     judged = run.law == ImpulseAugmented().name and every_row and not np.isnan(restitution)
-    return replace(found, span=span, restitution=restitution, total=total, restitution_judged=judged)
+    return replace(
+        found, span=span, restitution=restitution, total=total, restitution_judged=judged
+    )
 
 
 def _pieces(run: Run, step: Integers) -> Iterator[Any]:
-    """Yield what is certified of a run in pieces of limited memory; the arrays of the run may be in a file."""
+    """Yield what is certified of a run in pieces of limited memory; the arrays of the run may be in
+    a file."""
     steps, first = max(min(_STEPS, _PIECE // (24 * max(run.q.shape[1], 1))), 1), 0
     while first == 0 or first < len(run.impulse):
         offsets = np.asarray(run.contacts.offsets[first : first + steps + 1])
-        few = max(int(np.searchsorted(offsets, offsets[0] + _ROWS, side="right")) - 1, 1)  # contacts are bounded, too
+        few = max(
+            int(np.searchsorted(offsets, offsets[0] + _ROWS, side="right")) - 1, 1
+        )  # contacts are bounded, too
         offsets = offsets[: few + 1]
-        last, hits = first + max(len(offsets) - 1, 1), np.searchsorted(step, (first, first + len(offsets) - 1))
+        last, hits = (
+            first + max(len(offsets) - 1, 1),
+            np.searchsorted(step, (first, first + len(offsets) - 1)),
+        )
         columns = {
-            "contacts": (slice(offsets[0], offsets[-1]), ("body_a", "body_b", "point", "normal", "impulse")),
-            "impacts": (slice(*hits), ("v_minus", "v_plus", "impulse", "scale", "mass_digest"))}
+            "contacts": (
+                slice(offsets[0], offsets[-1]),
+                ("body_a", "body_b", "point", "normal", "impulse"),
+            ),
+            "impacts": (slice(*hits), ("v_minus", "v_plus", "impulse", "scale", "mass_digest")),
+        }
         tables: dict[str, Any] = {
-            table: SimpleNamespace(**{name: np.asarray(getattr(getattr(run, table), name)[rows]) for name in names})
-            for table, (rows, names) in columns.items()}
-        tables["contacts"].offsets, tables["impacts"].step = offsets - offsets[0], step[slice(*hits)] - first
-        yield SimpleNamespace(law=run.law, law_settings=run.law_settings, scene_resolved=run.scene_resolved,
-                              q=run.q[first:last], impulse=run.impulse[first:last], before=int(hits[0]), **tables)
+            table: SimpleNamespace(
+                **{name: np.asarray(getattr(getattr(run, table), name)[rows]) for name in names}
+            )
+            for table, (rows, names) in columns.items()
+        }
+        tables["contacts"].offsets, tables["impacts"].step = (
+            offsets - offsets[0],
+            step[slice(*hits)] - first,
+        )
+        yield SimpleNamespace(
+            law=run.law,
+            law_settings=run.law_settings,
+            scene_resolved=run.scene_resolved,
+            q=run.q[first:last],
+            impulse=run.impulse[first:last],
+            before=int(hits[0]),
+            **tables,
+        )
         first = last
 
 
@@ -266,15 +341,18 @@ def _total(run: Any) -> float:
 
 
 def _batches(run: Any) -> Iterator[Batch]:
-    """Yield M, v⁻, v⁺ and the generalized impulse of the recorded impacts in batches of `_BATCH`."""
+    """Yield M, v⁻, v⁺ and the generalized impulse of the recorded impacts in batches of
+    `_BATCH`."""
     table, mechanism = run.impacts, mechanism_of(scene_from_values(run.scene_resolved))
     for start in range(0, len(table.step), _BATCH):
         chosen = slice(start, start + _BATCH)
         masses = mechanism.mass_matrices(run.q[table.step[chosen]])
         other = np.flatnonzero(digests(masses) != table.mass_digest[chosen])
         if len(other):
-            raise IapbError(f"impact {run.before + start + other[0]}: M computed again from q differs from the "
-                            "recorded M; the record was changed, or another version of iapb wrote it")
+            raise IapbError(
+                f"impact {run.before + start + other[0]}: M computed again from q differs from the "
+                "recorded M; the record was changed, or another version of iapb wrote it"
+            )
         yield masses, table.v_minus[chosen], table.v_plus[chosen], table.impulse[chosen]
 
 
@@ -288,9 +366,9 @@ def exported_run(run: Run) -> Iterator[str]:
 def exported(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -> Iterator[str]:
     """Yield each impact as a line of integers, for a checker that shares no code with this module.
 
-    A line holds d, then a mantissa and an exponent of two for each entry of M (row by row), of v⁻ and of v⁺. Nothing is
-    rounded. A complete file starts with `EXPORT_HEAD` and ends with "end" and the number of impacts. The arguments are
-    those of `judge_gains`, for n impacts.
+    A line holds d, then a mantissa and an exponent of two for each entry of M (row by row), of v⁻
+    and of v⁺. Nothing is rounded. A complete file starts with `EXPORT_HEAD` and ends with "end" and
+    the number of impacts. The arguments are those of `judge_gains`, for n impacts.
     """
     masses, before, after = _impacts(mass_matrix, v_minus, v_plus=v_plus)
     masses = np.broadcast_to(masses, (len(before), *masses.shape[1:]))
@@ -300,8 +378,9 @@ def exported(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -> I
         yield " ".join(map(str, (len(mass), *pairs.ravel().tolist())))
 
 
-def certify_impacts(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike,
-                    impulse: ArrayLike | None = None) -> Certificate:
+def certify_impacts(
+    mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike, impulse: ArrayLike | None = None
+) -> Certificate:
     """Judge n impacts of any engine exactly.
 
     Parameters
@@ -334,17 +413,30 @@ def certify_impacts(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLik
 
 
 def _refuse_indefinite(masses: Floats, start: int) -> None:
-    scaled = masses / np.maximum(np.abs(masses).max(axis=(1, 2), keepdims=True, initial=0.0), 1e-300)
+    scaled = masses / np.maximum(
+        np.abs(masses).max(axis=(1, 2), keepdims=True, initial=0.0), 1e-300
+    )
     values = np.linalg.eigvalsh(0.5 * scaled + 0.5 * scaled.transpose(0, 2, 1))
-    wrong = np.flatnonzero(values.min(axis=1, initial=0.0) < -_INDEFINITE * np.abs(values).max(axis=1, initial=0.0))
+    wrong = np.flatnonzero(
+        values.min(axis=1, initial=0.0) < -_INDEFINITE * np.abs(values).max(axis=1, initial=0.0)
+    )
     if len(wrong):
-        raise ArgumentError(f"mass_matrix of impact {start + wrong[0]}", masses[wrong[0]].tolist(),
-                            "a matrix without negative eigenvalues")
+        raise ArgumentError(
+            f"mass_matrix of impact {start + wrong[0]}",
+            masses[wrong[0]].tolist(),
+            "a matrix without negative eigenvalues",
+        )
 
 
 def _certificate(batches: Iterable[Batch]) -> Certificate:
     """Judge impacts in batches of M, v⁻, v⁺ and impulse."""
-    judged, largest, momentum, first, shown = [Judged(np.zeros(0, np.bool_), 0, 0)], 0.0, np.nan, -1, ""
+    judged, largest, momentum, first, shown = (
+        [Judged(np.zeros(0, np.bool_), 0, 0)],
+        0.0,
+        np.nan,
+        -1,
+        "",
+    )
     for masses, before, after, recorded in batches:
         done = sum(len(one.gained) for one in judged)
         judged.append(_judged(masses, before, after))
@@ -355,23 +447,35 @@ def _certificate(batches: Iterable[Batch]) -> Certificate:
         if recorded is not None and len(before):
             with np.errstate(over="ignore", invalid="ignore"):  # an overflow fails the certificate
                 change = (after - before)[:, :, None]
-                size = np.matmul(np.abs(masses), np.abs(change))[:, :, 0].sum(axis=1) + np.abs(recorded).sum(axis=1)
+                size = np.matmul(np.abs(masses), np.abs(change))[:, :, 0].sum(axis=1) + np.abs(
+                    recorded
+                ).sum(axis=1)
                 error = np.abs(np.matmul(masses, change)[:, :, 0] - recorded).sum(axis=1)
             momentum = float(np.fmax(momentum, _largest_share(error, size)))
     gained = np.concatenate([one.gained for one in judged])
-    return Certificate(len(gained), int(gained.sum()), sum(one.by_integers for one in judged),
-                       sum(one.checked for one in judged), first, largest, momentum, counterexample=shown)
+    return Certificate(
+        len(gained),
+        int(gained.sum()),
+        sum(one.by_integers for one in judged),
+        sum(one.checked for one in judged),
+        first,
+        largest,
+        momentum,
+        counterexample=shown,
+    )
 
 
 def _largest_share(error: Floats, size: Floats) -> float:
-    """Return the largest error / size: 0 / 0 counts as 0, an overflow as infinity; NaN is kept for "not judged"."""
+    """Return the largest error / size: 0 / 0 counts as 0, an overflow as infinity; NaN is kept for
+    "not judged"."""
     with np.errstate(invalid="ignore", divide="ignore"):
         share = np.where(error == 0.0, 0.0, error / size)
     return float(np.where(np.isnan(share), np.inf, share).max(initial=0.0))
 
 
 def relative_gain(mass: ArrayLike, before: ArrayLike, after: ArrayLike) -> float:
-    """Return (KE⁺ − KE⁻)/KE⁻, rounded with its sign kept: never to 0; infinite beyond 1.8e308, and from rest."""
+    """Return (KE⁺ − KE⁻)/KE⁻, rounded with its sign kept: never to 0; infinite beyond 1.8e308, and
+    from rest."""
     gain, energy = exact_gain(mass, before, after), -exact_gain(mass, before, np.zeros_like(before))
     if not gain or not energy:
         return np.inf if gain else 0.0
@@ -395,11 +499,15 @@ print(twice_energy(v_plus) - twice_energy(v_minus))  # above 0: the impact gaine
 
 
 def _contacts(run: Any, silent: bool) -> tuple[float, float]:
-    """Return `Certificate.span` and `Certificate.restitution`; NaN for one that the record cannot decide."""
+    """Return `Certificate.span` and `Certificate.restitution`; NaN for one that the record cannot
+    decide."""
     table, impacts, scene = run.contacts, run.impacts, scene_from_values(run.scene_resolved)
     if silent or not len(impacts.step):
         return np.nan, np.nan
-    mechanism, rubbing = mechanism_of(scene), run.law_settings.get("friction_in_impacts") and scene.largest_friction > 0
+    mechanism, rubbing = (
+        mechanism_of(scene),
+        run.law_settings.get("friction_in_impacts") and scene.largest_friction > 0,
+    )
     if rubbing or scene.contact.self_collision_rows == "per_body":
         return np.nan, np.nan
     values = restitutions_of(scene, pairs_of(scene, shapes_of(scene)))
@@ -413,15 +521,19 @@ def _contacts(run: Any, silent: bool) -> tuple[float, float]:
     for start in range(0, len(struck), _BATCH):
         m = struck[start : start + _BATCH]
         k, normal = np.searchsorted(steps, step_of[m]), table.normal[m]  # (11), (12): nᵀ(J_a − J_b)
-        rows_a, rows_b = (mechanism.rows_along(run.q[steps[k]], body[m], table.point[m], normal)
-                          for body in (table.body_a, table.body_b))
+        rows_a, rows_b = (
+            mechanism.rows_along(run.q[steps[k]], body[m], table.point[m], normal)
+            for body in (table.body_a, table.body_b)
+        )
         rows = rows_a - rows_b
         pushed = rows * table.impulse[m][:, None]
         np.add.at(difference, k, pushed)
         np.add.at(size, k, np.abs(pushed))
         if equality:
             before, after = impacts.v_minus[first[k]], impacts.v_plus[last[k]]
-            off = np.abs((rows * after).sum(axis=1) + float(values[0]) * (rows * before).sum(axis=1))
+            off = np.abs(
+                (rows * after).sum(axis=1) + float(values[0]) * (rows * before).sum(axis=1)
+            )
             felt = np.abs(rows * before).sum(axis=1)
             residual = max(residual, _largest_share(off[whole[k]], felt[whole[k]]))
     span = _largest_share(np.abs(difference).sum(axis=1), size.sum(axis=1))

@@ -1,12 +1,13 @@
-"""Check a scene before its run for settings that make the result meaningless. Each warning says what value to set.
+"""Check a scene before its run for settings that make the result meaningless. Each warning says
+what value to set.
 
-The explicit forces of the paper have limits that implicit contact has not. A lasting contact oscillates on its spring
-and damper (5). Let m = 1/(J M⁻¹ Jᵀ) be its effective mass, k = K Δt²/m and
-b = B Δt/m. A step maps (gap, velocity) linearly. The oscillation grows if that map has an eigenvalue of modulus above
-1, which means k + 2 b > 4. Contacts that share a body oscillate
-together: 1/m is then the largest eigenvalue of J M⁻¹ Jᵀ over all of them. A new contact can start at a depth of up to
-v Δt, and its spring then returns up to k times the kinetic energy of the approach, so k must not exceed 1 either.
-`iapb.advice.distrust` checks the run itself.
+The explicit forces of the paper have limits that implicit contact has not. A lasting contact
+oscillates on its spring and damper (5). Let m = 1/(J M⁻¹ Jᵀ) be its effective mass, k = K Δt²/m and
+b = B Δt/m. A step maps (gap, velocity) linearly. The oscillation grows if that map has an
+eigenvalue of modulus above 1, which means k + 2 b > 4. Contacts that share a body oscillate
+together: 1/m is then the largest eigenvalue of J M⁻¹ Jᵀ over all of them. A new contact can start
+at a depth of up to v Δt, and its spring then returns up to k times the kinetic energy of the
+approach, so k must not exceed 1 either. `iapb.advice.distrust` checks the run itself.
 """
 
 from __future__ import annotations
@@ -37,12 +38,14 @@ SHIFTED = 0.05  # of the smaller shape: distance by which friction in an impact 
 SAG = 0.1  # of the smaller shape, or of a joint's range: largest static sag of a rigid contact
 THROWN = 1.0  # largest k = K Δt²/m at which a new contact returns no more energy than it absorbs
 ROUNDED = 1e-9  # relative rounding error of a limit
-MANY_TURNS = 45  # a joint may turn often, so only multiples of this many radians (seven turns) count as degrees
+# a joint may turn often, so only multiples of this many radians (seven turns) count as degrees
+MANY_TURNS = 45
 MANY_PAIRS = 2000  # with more pairs, only those closer than the largest body are checked
 
 
 class Caution(NamedTuple):
-    """A warning about a scene: its kind, the things that it concerns, and a sentence with the value to set."""
+    """A warning about a scene: its kind, the things that it concerns, and a sentence with the value
+    to set."""
 
     kind: str
     where: str
@@ -56,8 +59,10 @@ class Caution(NamedTuple):
 class StepLimits:
     """Limits of stiffness, damping and rate at the most critical contacts.
 
-    mass : smallest effective mass [kg]; contacts : number of contacts that oscillate together; where : their bodies
-    stiffness : largest stable K at the scene's damping [N/m]; damping : largest stable B at its stiffness [N s/m]
+    mass : smallest effective mass [kg]; contacts : number of contacts that oscillate together;
+        where : their bodies
+    stiffness : largest stable K at the scene's damping [N/m]; damping : largest stable B at its
+        stiffness [N s/m]
     rate : smallest rate [Hz] at which the scene's stiffness and damping are stable
     """
 
@@ -70,61 +75,108 @@ class StepLimits:
 
 
 class Start:
-    """A scene at its start: its closest contacts and joint limits, with their rows, effective masses and loads.
+    """A scene at its start: its closest contacts and joint limits, with their rows, effective
+    masses and loads.
 
-    A joint limit is a contact with one number, after those of the shapes, in place of its two shapes.
+    A joint limit is a contact with one number, after those of the shapes, in place of its two
+    shapes.
     """
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.dt, self.spatial = scene, 1.0 / scene.rate, isinstance(scene, SpatialScene)
         self.mechanism, (self.q, self.v) = mechanism.mechanism_of(scene), mechanism.start_of(scene)
         self.shapes = mechanism.shapes_of(scene)
-        self.pairs, self.stops = mechanism.pairs_of(scene, self.shapes), mechanism.stops_of(scene, self.mechanism)
+        self.pairs, self.stops = (
+            mechanism.pairs_of(scene, self.shapes),
+            mechanism.stops_of(scene, self.mechanism),
+        )
         self.gravity = np.array([*(scene.gravity or ()), 0.0, 0.0, 0.0])[:3]
-        self.labels = [body.name for body in scene.bodies for _ in body.shapes] + [wall.name for wall in scene.walls]
+        self.labels = [body.name for body in scene.bodies for _ in body.shapes] + [
+            wall.name for wall in scene.walls
+        ]
         solids, trees = solids_of(self.shapes), self.mechanism.tree_of_body
         size = [solids[i].thin if i in solids else math.inf for i in range(len(self.labels))]
-        for b, sign, arm in zip(self.stops.body.tolist(), self.stops.sign, self.stops.arm.tolist(), strict=True):
-            self.labels.append(f"the {'lower' if sign > 0.0 else 'upper'} limit of {scene.bodies[b].name}")
+        for b, sign, arm in zip(
+            self.stops.body.tolist(), self.stops.sign, self.stops.arm.tolist(), strict=True
+        ):
+            self.labels.append(
+                f"the {'lower' if sign > 0.0 else 'upper'} limit of {scene.bodies[b].name}"
+            )
             size.append(arm * float(np.ptp(scene.bodies[b].joint_limits or (0.0,))))
         none = np.full(len(self.stops.body), -1)
-        self.kind, self.radius = np.append(self.shapes.kind, none), np.append(self.shapes.radius, none)
-        # contacts: trees (at a wall twice the same), Jacobian rows J (c, d), friction, thickness of the thinner
+        self.kind, self.radius = (
+            np.append(self.shapes.kind, none),
+            np.append(self.shapes.radius, none),
+        )
+        # contacts: trees (at a wall twice the same), Jacobian rows J (c, d), friction, thickness of
+        # the thinner
         self.found = found = self._contacts(size[: len(self.shapes.kind)])
-        self.tree_a, self.tree_b = trees[found.body_a], trees[np.where(found.body_b < 0, found.body_a, found.body_b)]
+        self.tree_a, self.tree_b = (
+            trees[found.body_a],
+            trees[np.where(found.body_b < 0, found.body_a, found.body_b)],
+        )
         self.rows = self.rows_along(np.arange(len(found.gap)), found.normal)
         self.first_stop = len(self.rows) - len(none)
-        self.rows[np.arange(self.first_stop, len(self.rows)), self.stops.dof] = self.stops.arm * self.stops.sign
+        self.rows[np.arange(self.first_stop, len(self.rows)), self.stops.dof] = (
+            self.stops.arm * self.stops.sign
+        )
         classes, table = mechanism.frictions_of(scene)
         self.friction = table[classes[found.shape_a], classes[found.shape_b]]
         self.size = np.array(size)
         self.thickness = np.minimum(self.size[found.shape_a], self.size[found.shape_b])
 
     def _contacts(self, sizes: list[float]) -> geometry.ContactBuffer:
-        """Return the contacts between the closest features of each pair, near or far, and those of joint limits."""
-        few, kind, places = len(self.pairs) <= MANY_PAIRS, self.shapes.kind, self.mechanism.placements(self.q)
+        """Return the contacts between the closest features of each pair, near or far, and those of
+        joint limits."""
+        few, kind, places = (
+            len(self.pairs) <= MANY_PAIRS,
+            self.shapes.kind,
+            self.mechanism.placements(self.q),
+        )
         corners = np.where(kind == geometry.BOX, 8, np.maximum(self.shapes.count, 2))
-        room = int(corners[self.pairs].sum()) + 32 if few else geometry.contact_capacity(self.shapes, self.pairs)
+        room = (
+            int(corners[self.pairs].sum()) + 32
+            if few
+            else geometry.contact_capacity(self.shapes, self.pairs)
+        )
         margin = math.inf if few else max((size for size in sizes if size < math.inf), default=0.0)
-        out, stops = zeros_of(geometry.ContactBuffer, contact=room + len(self.stops.body)), self.stops
-        count = max(int(detect(block(self.shapes), self.pairs, *places, margin, out)), 0) if len(self.pairs) else 0
+        out, stops = (
+            zeros_of(geometry.ContactBuffer, contact=room + len(self.stops.body)),
+            self.stops,
+        )
+        count = (
+            max(int(detect(block(self.shapes), self.pairs, *places, margin, out)), 0)
+            if len(self.pairs)
+            else 0
+        )
         new = slice(count, count + len(stops.body))
-        out.gap[new], out.normal[new] = stops.arm * stops.sign * (self.q[stops.coordinate] - stops.bound), 0.0
+        out.gap[new], out.normal[new] = (
+            stops.arm * stops.sign * (self.q[stops.coordinate] - stops.bound),
+            0.0,
+        )
         out.shape_a[new] = out.shape_b[new] = stops.shape
-        out.body_a[new], out.body_b[new], out.point[new] = stops.body, stops.parent, places[1][stops.body]
+        out.body_a[new], out.body_b[new], out.point[new] = (
+            stops.body,
+            stops.parent,
+            places[1][stops.body],
+        )
         return geometry.ContactBuffer(*(column[: new.stop] for column in out))  # type: ignore[arg-type]
 
     def rows_along(self, contacts: Rows, directions: Floats) -> Floats:
         """Return the Jacobian rows (k, d) of contacts (k,) along directions (k, 3)."""
         qs, point = np.tile(self.q, (len(contacts), 1)), self.found.point[contacts]
-        a, b = (self.mechanism.rows_along(qs, body[contacts], point, directions)
-                for body in (self.found.body_a, self.found.body_b))
+        a, b = (
+            self.mechanism.rows_along(qs, body[contacts], point, directions)
+            for body in (self.found.body_a, self.found.body_b)
+        )
         return a - b
 
     def slips(self, i: int) -> Floats:
         """Jacobian rows of contact i across its normal: one in the plane, two in space."""
         n = self.found.normal[i]
-        across = geometry.frame_along(n)[:, :2].T if self.spatial else np.array([[-n[1], n[0], 0.0]])
+        across = (
+            geometry.frame_along(n)[:, :2].T if self.spatial else np.array([[-n[1], n[0], 0.0]])
+        )
         return self.rows_along(np.full(len(across), i), across)
 
     @cached_property
@@ -159,7 +211,8 @@ class Start:
 
     @cached_property
     def fall(self) -> Floats:
-        """Acceleration (d,) by gravity and the hand at the start, without contacts and without motion."""
+        """Acceleration (d,) by gravity and the hand at the start, without contacts and without
+        motion."""
         return self.moved(self.applied(self.q)[None])[:, 0]
 
     @cached_property
@@ -169,7 +222,8 @@ class Start:
 
     @cached_property
     def meeting(self) -> tuple[Floats, Floats]:
-        """When each gap closes at constant acceleration [s], infinite if never, and with which speed [m/s]."""
+        """When each gap closes at constant acceleration [s], infinite if never, and with which
+        speed [m/s]."""
         gap, approach = np.maximum(self.found.gap, 0.0), -(self.rows @ self.v)
         square = approach**2 - 2.0 * self.pull * gap
         speed, time = np.sqrt(np.maximum(square, 0.0)), np.where(gap == 0.0, 0.0, math.inf)
@@ -178,70 +232,108 @@ class Start:
 
     @cached_property
     def by_pair(self) -> list[Rows]:
-        """Contacts of each pair of shapes, closest first: at most 4 in space and 2 in the plane, as on a flat face."""
+        """Contacts of each pair of shapes, closest first: at most 4 in space and 2 in the plane, as
+        on a flat face."""
         kept: dict[tuple[int, int], list[int]] = {}
-        for i, pair in enumerate(zip(self.found.shape_a.tolist(), self.found.shape_b.tolist(), strict=True)):
+        for i, pair in enumerate(
+            zip(self.found.shape_a.tolist(), self.found.shape_b.tolist(), strict=True)
+        ):
             kept.setdefault(pair, []).append(i)
-        return [np.array(sorted(rows, key=lambda i: float(self.found.gap[i]))[: 4 if self.spatial else 2])
-                for rows in kept.values()]
+        return [
+            np.array(
+                sorted(rows, key=lambda i: float(self.found.gap[i]))[: 4 if self.spatial else 2]
+            )
+            for rows in kept.values()
+        ]
 
     @cached_property
     def touching(self) -> list[Rows]:
-        """Contacts that touch or nearly touch at the start, in groups that shared moving trees connect."""
-        near = np.flatnonzero(self.found.gap <= NEAR * np.where(np.isfinite(self.thickness), self.thickness, 0.0))
+        """Contacts that touch or nearly touch at the start, in groups that shared moving trees
+        connect."""
+        near = np.flatnonzero(
+            self.found.gap <= NEAR * np.where(np.isfinite(self.thickness), self.thickness, 0.0)
+        )
         both = self.tree_a[near], self.tree_b[near]
         group = joined(len(self.mechanism.tree_dofs), zip(*both, strict=True))[both[0]]
         return [near[group == one] for one in dict.fromkeys(group.tolist())]
 
     @cached_property
     def supports(self) -> list[Rows]:
-        """Groups of contacts that carry loads: those that touch, and the first pair that a falling tree hits."""
-        touched = {int(tree[i]) for rows in self.touching for i in rows for tree in (self.tree_a, self.tree_b)}
+        """Groups of contacts that carry loads: those that touch, and the first pair that a falling
+        tree hits."""
+        touched = {
+            int(tree[i])
+            for rows in self.touching
+            for i in rows
+            for tree in (self.tree_a, self.tree_b)
+        }
         falls: dict[int, Rows] = {}
         for rows in self.by_pair:
             i, tree = int(rows[0]), int(self.tree_a[rows[0]])
-            free = np.count_nonzero(self.mechanism.tree_of_body == tree) == 1  # a linkage would change its pose
+            free = (
+                np.count_nonzero(self.mechanism.tree_of_body == tree) == 1
+            )  # a linkage would change its pose
             flat = len(rows) > 1 or self.radius[self.found.shape_a[i]] > 0.0  # not on one corner
             if tree not in touched and free and flat and self.pull[i] < 0.0:
-                falls[tree] = min(falls.get(tree, rows), rows, key=lambda rows: float(self.found.gap[rows[0]]))
+                falls[tree] = min(
+                    falls.get(tree, rows), rows, key=lambda rows: float(self.found.gap[rows[0]])
+                )
         return [*self.touching, *falls.values()]
 
     @cached_property
     def critical(self) -> tuple[tuple[float, Rows], tuple[float, Rows]]:
-        """Largest mobility [1/kg] and its contacts, twice: over touching groups and near pairs, and over near pairs."""
+        """Largest mobility [1/kg] and its contacts, twice: over touching groups and near pairs, and
+        over near pairs."""
         nobody = (0.0, np.zeros(0, np.int64))
-        boxes = (self.kind[self.found.shape_a] == geometry.BOX) & (self.kind[self.found.shape_b] == geometry.BOX)
+        boxes = (self.kind[self.found.shape_a] == geometry.BOX) & (
+            self.kind[self.found.shape_b] == geometry.BOX
+        )
         near = ~boxes | (self.found.gap <= self.thickness)  # so that the row is valid at touch
         meeting = [(self.mobility(self.rows[rows]), rows) for rows in self.by_pair if near[rows[0]]]
         lasting = [(self.mobility(self.rows[rows]), rows) for rows in self.touching]
-        return (max([*lasting, *meeting], key=lambda one: one[0], default=nobody),
-                max(meeting, key=lambda one: one[0], default=nobody))
+        return (
+            max([*lasting, *meeting], key=lambda one: one[0], default=nobody),
+            max(meeting, key=lambda one: one[0], default=nobody),
+        )
 
     def loads(self, rows: Rows) -> Floats:
-        """Return forces p >= 0 (c,) [N] of a group of contacts that balance gravity and the hand: W p = −J M⁻¹ f."""
+        """Return forces p >= 0 (c,) [N] of a group of contacts that balance gravity and the hand: W
+        p = −J M⁻¹ f."""
         W, force = self.rows[rows] @ self.moved(self.rows[rows]), np.zeros(len(rows))
         pushing = np.ones(len(rows), np.bool_)
         for _ in range(len(rows)):
             force[:] = 0.0
-            force[pushing] = np.linalg.lstsq(W[np.ix_(pushing, pushing)], -self.pull[rows][pushing], rcond=1e-12)[0]
+            force[pushing] = np.linalg.lstsq(
+                W[np.ix_(pushing, pushing)], -self.pull[rows][pushing], rcond=1e-12
+            )[0]
             if (force >= 0.0).all():
                 break
             pushing &= force > 0.0  # a contact that would pull carries nothing
         hand = self.scene.hand.largest_force() if self.scene.hand is not None else 0.0
         weights = float(np.linalg.norm(self.gravity)) * sum(body.mass for body in self.scene.bodies)
-        return np.clip(force, 0.0, weights + hand)  # wedges and levers can give more, but less in other poses
+        return np.clip(
+            force, 0.0, weights + hand
+        )  # wedges and levers can give more, but less in other poses
 
     def names(self, rows: Iterable[int]) -> str:
-        """Return the names of the things in contact, such as "box and floor"; of more than two, the first three."""
+        """Return the names of the things in contact, such as "box and floor"; of more than two, the
+        first three."""
         shapes = [s for i in rows for s in (int(self.found.shape_a[i]), int(self.found.shape_b[i]))]
         named = list(dict.fromkeys(self.labels[s] for s in shapes))
-        return " and ".join(named) if len(named) < 3 else f"{', '.join(named[:3])}{' …' if len(named) > 3 else ''}"
+        return (
+            " and ".join(named)
+            if len(named) < 3
+            else f"{', '.join(named[:3])}{' …' if len(named) > 3 else ''}"
+        )
 
 
 def step_limits(start: Start) -> StepLimits | None:
     """Return the limits at the most critical contacts; None if nothing can touch."""
-    worst = (_limits_at(start, *one, most) for one, most in zip(start.critical, (math.inf, THROWN), strict=True)
-             if one[0])  # fmt: skip
+    worst = (
+        _limits_at(start, *one, most)
+        for one, most in zip(start.critical, (math.inf, THROWN), strict=True)
+        if one[0]
+    )
     return min(worst, key=lambda one: (one.stiffness, one.damping), default=None)
 
 
@@ -255,8 +347,14 @@ def _limits_at(start: Start, mobility: float, rows: Rows, most: float) -> StepLi
     damping = max(0.0, 0.5 * (stable - k))
     # A step of Δt/y has k/y² and b/y, so it is stable from the root of 4 y² - 2 b y - k on.
     least = max((b + math.sqrt(b**2 + stable * k)) / stable, math.sqrt(k / most))
-    return StepLimits(start.names(rows), len(rows), 1.0 / mobility, stiffness / (mobility * dt**2),
-                      damping / (mobility * dt), least / dt)
+    return StepLimits(
+        start.names(rows),
+        len(rows),
+        1.0 / mobility,
+        stiffness / (mobility * dt**2),
+        damping / (mobility * dt),
+        least / dt,
+    )
 
 
 def check_scene(scene: Scene, law: laws.ContactLaw | None = None) -> tuple[Caution, ...]:
@@ -265,7 +363,8 @@ def check_scene(scene: Scene, law: laws.ContactLaw | None = None) -> tuple[Cauti
     Parameters
     ----------
     scene : Scene
-    law : contact law; default `ImpulseAugmented()`. Fields that the law does not use are not checked.
+    law : contact law; default `ImpulseAugmented()`. Fields that the law does not use are not
+        checked.
 
     Returns
     -------
@@ -283,8 +382,14 @@ def check_scene(scene: Scene, law: laws.ContactLaw | None = None) -> tuple[Cauti
         found += _too_stiff(start)
         found += _overdriven_friction(start) if laws.FRICTION in uses else ()
     elif laws.PENALTY in uses and start.spatial and len(start.pairs) and integrator != "momentum":
-        found.append(Caution("integrator", scene.name, "implicit contact in space can gain energy with the integrator "
-                             f"{integrator}: set integrator: momentum, or contact.forces: paper"))
+        found.append(
+            Caution(
+                "integrator",
+                scene.name,
+                "implicit contact in space can gain energy with the integrator "
+                f"{integrator}: set integrator: momentum, or contact.forces: paper",
+            )
+        )
     frictionless = laws.IMPULSES in uses and laws.IMPACT_FRICTION not in uses
     if frictionless and scene.contact.self_collision_rows == "relative":
         found += _slips_through_impacts(start)
@@ -292,42 +397,67 @@ def check_scene(scene: Scene, law: laws.ContactLaw | None = None) -> tuple[Cauti
 
 
 def _degrees(scene: Scene) -> Iterator[Caution]:
-    """Warn of angles that look like degrees: whole numbers beyond one turn, in joints multiples of 45."""
+    """Warn of angles that look like degrees: whole numbers beyond one turn, in joints multiples of
+    45."""
     placed: list[tuple[tuple[str | int, ...], Any]] = []  # path, and what has angles
     for part, things in (("bodies", scene.bodies), ("walls", scene.walls)):
         for i, one in enumerate(things):
             shapes = enumerate(getattr(one, "shapes", ()))
             placed += [((part, i), one), *(((part, i, "shapes", k), shape) for k, shape in shapes)]
-    angles = [((*path, "angle"), one.angle, 1) for path, one in placed if hasattr(one, "angle")]  # with its unit
-    angles += [((*path, "rpy", k), x, 1) for path, one in placed for k, x in enumerate(getattr(one, "rpy", ()))]
+    angles = [
+        ((*path, "angle"), one.angle, 1) for path, one in placed if hasattr(one, "angle")
+    ]  # with its unit
+    angles += [
+        ((*path, "rpy", k), x, 1)
+        for path, one in placed
+        for k, x in enumerate(getattr(one, "rpy", ()))
+    ]
     for i, body in enumerate(scene.bodies):
-        angles += [(("bodies", i, "position", 2), body.position[2], 1)] if body.joint == "planar" else []
+        angles += (
+            [(("bodies", i, "position", 2), body.position[2], 1)] if body.joint == "planar" else []
+        )
         for field in ("position", "joint_limits") if body.joint == "revolute" else ():
-            angles += [(("bodies", i, field, k), x, MANY_TURNS) for k, x in enumerate(getattr(body, field) or ())]
+            angles += [
+                (("bodies", i, field, k), x, MANY_TURNS)
+                for k, x in enumerate(getattr(body, field) or ())
+            ]
     for path, angle, unit in angles:
         if abs(angle) > math.tau and angle % unit == 0.0:
-            yield Caution("degrees", written(path), f"{scene.place_of(*path)}{written(path)} = {angle:g} rad looks "
-                          f"like degrees: set {math.radians(angle):.6g}, for angles are in radians")
+            yield Caution(
+                "degrees",
+                written(path),
+                f"{scene.place_of(*path)}{written(path)} = {angle:g} rad looks "
+                f"like degrees: set {math.radians(angle):.6g}, for angles are in radians",
+            )
 
 
 def _inertias(scene: Scene) -> Iterator[Caution]:
-    """Warn of moments of inertia that no body has: the largest one exceeds the sum of the others by a thousandth."""
+    """Warn of moments of inertia that no body has: the largest one exceeds the sum of the others by
+    a thousandth."""
     for i, body in enumerate(scene.bodies if isinstance(scene, SpatialScene) else ()):
         low, middle, high = np.linalg.eigvalsh(inertia_matrix(body.inertia)).tolist()
         if high > 1.001 * (low + middle):
             path = ("bodies", i, "inertia")
-            yield Caution("inertia", written(path), f"{scene.place_of(*path)}{written(path)}: no body has a moment of "
-                          f"{high:.3g} kg m2 beside {low:.3g} and {middle:.3g}; it is at most their sum")
+            yield Caution(
+                "inertia",
+                written(path),
+                f"{scene.place_of(*path)}{written(path)}: no body has a moment of "
+                f"{high:.3g} kg m2 beside {low:.3g} and {middle:.3g}; it is at most their sum",
+            )
 
 
 def _overlaps(start: Start) -> Iterator[Caution]:
-    """Warn of shapes that start inside each other, behind a wall, or in a gap narrower than the shape."""
+    """Warn of shapes that start inside each other, behind a wall, or in a gap narrower than the
+    shape."""
     found, sides, resting = start.found, dict[int, list[int]](), np.zeros(len(start.rows))
     for rows in start.touching:
         resting[rows] = start.loads(rows)
     for rows in start.by_pair:
         i = int(rows[0])
-        depth, (a, b) = -float(found.gap[i]), (start.labels[s] for s in (found.shape_a[i], found.shape_b[i]))
+        depth, (a, b) = (
+            -float(found.gap[i]),
+            (start.labels[s] for s in (found.shape_a[i], found.shape_b[i])),
+        )
         if depth <= 0.0 or not _too_deep(start, rows, float(resting[rows].max())):
             continue
         if found.body_b[i] < 0:
@@ -337,31 +467,60 @@ def _overlaps(start: Start) -> Iterator[Caution]:
         remedy = f": move it by [{out}] m"
         if start.kind[found.shape_b[i]] in geometry.ENDLESS and depth >= start.thickness[i]:
             kind, says = "outside", f"{a} starts behind {b}, {in_metres(depth)} deep"
-        elif float(start.rows[i] @ start.moved(start.rows[i][None])[:, 0]) <= 1e-12 * start.critical[0][0]:
-            says, remedy = f"{says}no joint can move it out", f"{remedy}, or take the shape or the wall away"
+        elif (
+            float(start.rows[i] @ start.moved(start.rows[i][None])[:, 0])
+            <= 1e-12 * start.critical[0][0]
+        ):
+            says, remedy = (
+                f"{says}no joint can move it out",
+                f"{remedy}, or take the shape or the wall away",
+            )
         else:
-            stored = 0.5 * start.scene.contact.stiffness * float(np.sum(np.minimum(found.gap[rows], 0.0) ** 2))
+            stored = (
+                0.5
+                * start.scene.contact.stiffness
+                * float(np.sum(np.minimum(found.gap[rows], 0.0) ** 2))
+            )
             thrown = f"{stored:.3g} J in the contact's spring throw it out"
             says += thrown if start.scene.contact.forces == "paper" else "the contact pushes it out"
         yield Caution(kind, f"{a} and {b}", f"{says}{remedy}")
     for rows_of_body in sides.values():
         for n, i in enumerate(rows_of_body):
-            for j in [j for j in rows_of_body[:n] if float(found.normal[i] @ found.normal[j]) < -0.5][:1]:
-                a, b, c = (start.labels[s] for s in (found.shape_a[i], found.shape_b[j], found.shape_b[i]))
-                yield Caution("wedged", f"{a}, {b}, {c}", f"{a} stands in a gap between {b} and {c} that is "
-                              f"{in_metres(-float(found.gap[i] + found.gap[j]))} narrower than it: widen the gap, or "
-                              f"make {a} smaller")
+            for j in [
+                j for j in rows_of_body[:n] if float(found.normal[i] @ found.normal[j]) < -0.5
+            ][:1]:
+                a, b, c = (
+                    start.labels[s] for s in (found.shape_a[i], found.shape_b[j], found.shape_b[i])
+                )
+                yield Caution(
+                    "wedged",
+                    f"{a}, {b}, {c}",
+                    f"{a} stands in a gap between {b} and {c} that is "
+                    f"{in_metres(-float(found.gap[i] + found.gap[j]))} narrower than it: widen "
+                    f"the gap, or "
+                    f"make {a} smaller",
+                )
 
 
 def _too_deep(start: Start, rows: Rows, resting: float) -> bool:
-    """Whether a pair starts deeper than at rest, under a load [N], judged by its depth and its springs' energy."""
+    """Whether a pair starts deeper than at rest, under a load [N], judged by its depth and its
+    springs' energy."""
     gap, J = np.minimum(start.found.gap[rows], 0.0), start.rows[rows]
-    depth, size, K = -float(gap.min()), float(start.thickness[rows[0]]), start.scene.contact.stiffness
+    depth, size, K = (
+        -float(gap.min()),
+        float(start.thickness[rows[0]]),
+        start.scene.contact.stiffness,
+    )
     if depth * K <= 2.0 * resting:
         return False
     mass = 1.0 / max(float(np.max(np.sum(J * start.moved(J).T, axis=1))), 1e-300)
-    kinetic, weight = 0.5 * mass * np.abs(J @ start.v).max() ** 2, mass * np.abs(start.pull[rows]).max()
-    usual = max(kinetic + weight * DEEP * size, 0.5 * mass * size**2)  # the latter: moving by its size in a second
+    kinetic, weight = (
+        0.5 * mass * np.abs(J @ start.v).max() ** 2,
+        mass * np.abs(start.pull[rows]).max(),
+    )
+    usual = max(
+        kinetic + weight * DEEP * size, 0.5 * mass * size**2
+    )  # the latter: moving by its size in a second
     return bool(depth > DEEP * size or depth > 1e-6 * size and 0.5 * K * np.sum(gap**2) > usual)
 
 
@@ -372,21 +531,40 @@ def _fast(start: Start) -> Iterator[Caution]:
         leaving = start.rows[i] @ start.v >= 0.0 and start.pull[i] >= 0.0
         if leaving or time > start.scene.duration or speed * start.dt <= 0.5 * size:
             continue
-        shapes = sorted((start.found.shape_b[i], start.found.shape_a[i]), key=lambda s: start.size[s])
+        shapes = sorted(
+            (start.found.shape_b[i], start.found.shape_a[i]), key=lambda s: start.size[s]
+        )
         thin, other = (start.labels[s] for s in shapes)
-        yield Caution("fast", f"{thin} and {other}", f"{other} meets {thin} at {speed:.3g} m/s, "
-                      f"{in_metres(speed * start.dt)} in a step, and the thinner is {in_metres(size)}: it sinks in or "
-                      f"passes through; set rate >= {_up(4.0 * speed / size):g} Hz")
+        yield Caution(
+            "fast",
+            f"{thin} and {other}",
+            f"{other} meets {thin} at {speed:.3g} m/s, "
+            f"{in_metres(speed * start.dt)} in a step, and the thinner is {in_metres(size)}: it "
+            f"sinks in or "
+            f"passes through; set rate >= {_up(4.0 * speed / size):g} Hz",
+        )
 
 
 def _slips_through_impacts(start: Start) -> Iterator[Caution]:
-    """Warn of a free body that slides as it first lands, if friction in the impact would change its path visibly."""
-    # Friction in the impact would reduce the slip by up to Δv = μ (1 + e) v_n. Without it, resting friction removes the
-    # same slip within Δv/(μ a), a the acceleration onto the wall; a bounce keeps it for a flight of 2 e v_n/a.
-    scene, found, first = start.scene, start.found, dict[int, tuple[float, int]]()  # tree -> time, contact
-    trees, held = start.mechanism.tree_of_body.tolist(), scene.hand.body if scene.hand is not None else ""
-    free = {tree for tree, body in zip(trees, scene.bodies, strict=True)
-            if trees.count(tree) == 1 and body.joint in ("planar", "free_flyer") and body.name != held}
+    """Warn of a free body that slides as it first lands, if friction in the impact would change its
+    path visibly."""
+    # Friction in the impact would reduce the slip by up to Δv = μ (1 + e) v_n. Without it, resting
+    # friction removes the same slip within Δv/(μ a), a the acceleration onto the wall; a bounce
+    # keeps it for a flight of 2 e v_n/a.
+    scene, found, first = (
+        start.scene,
+        start.found,
+        dict[int, tuple[float, int]](),
+    )  # tree -> time, contact
+    trees, held = (
+        start.mechanism.tree_of_body.tolist(),
+        scene.hand.body if scene.hand is not None else "",
+    )
+    free = {
+        tree
+        for tree, body in zip(trees, scene.bodies, strict=True)
+        if trees.count(tree) == 1 and body.joint in ("planar", "free_flyer") and body.name != held
+    }
     for i in (int(rows[0]) for rows in start.by_pair):
         both = {int(start.tree_a[i]), int(start.tree_b[i])}
         for tree in both if both <= free else ():
@@ -395,34 +573,64 @@ def _slips_through_impacts(start: Start) -> Iterator[Caution]:
     for time, i in sorted(first.values()):
         if time >= scene.duration or start.friction[i] == 0.0:
             continue
-        speed, mu, left = float(start.meeting[1][i]), float(start.friction[i]), scene.duration - time
-        e = float(mechanism.restitution_by_pair(scene, np.array([[found.shape_a[i], found.shape_b[i]]]))[0])
+        speed, mu, left = (
+            float(start.meeting[1][i]),
+            float(start.friction[i]),
+            scene.duration - time,
+        )
+        e = float(
+            mechanism.restitution_by_pair(scene, np.array([[found.shape_a[i], found.shape_b[i]]]))[
+                0
+            ]
+        )
         slip = float(np.linalg.norm(start.slips(i) @ (start.v + time * start.fall)))
         change, force = min(mu * (1.0 + e) * speed, slip), -float(start.pull[i])
-        lasts = left if force <= 0.0 else min(left, max(2.0 * e * speed / force, 0.5 * change / (mu * force)))
+        lasts = (
+            left
+            if force <= 0.0
+            else min(left, max(2.0 * e * speed / force, 0.5 * change / (mu * force)))
+        )
         if change * lasts / float(start.thickness[i]) >= worst:
             worst, names = change * lasts / float(start.thickness[i]), start.names([i])
-            said = [Caution("impact friction", names, f"{names} meet at {speed:.3g} m/s and slide at {slip:.3g} m/s, "
-                            f"and impacts of this law have no friction, which would take {change:.3g} m/s of it: use "
-                            "the world IAPB-friction or ideal-friction")]
+            said = [
+                Caution(
+                    "impact friction",
+                    names,
+                    f"{names} meet at {speed:.3g} m/s and slide at {slip:.3g} m/s, "
+                    f"and impacts of this law have no friction, which would take {change:.3g} m/s "
+                    f"of it: use "
+                    "the world IAPB-friction or ideal-friction",
+                )
+            ]
     yield from said
 
 
 def _too_stiff(start: Start) -> Iterator[Caution]:
     """Warn of stiffness or damping beyond the stable limits of the step."""
     limits, contact = step_limits(start), start.scene.contact
-    if limits is None or (contact.stiffness <= limits.stiffness and contact.damping <= limits.damping):
+    if limits is None or (
+        contact.stiffness <= limits.stiffness and contact.damping <= limits.damping
+    ):
         return
-    by_damping = limits.damping > 0.0 and contact.damping * limits.stiffness > contact.stiffness * limits.damping
+    by_damping = (
+        limits.damping > 0.0
+        and contact.damping * limits.stiffness > contact.stiffness * limits.damping
+    )
     field = "damping" if limits.stiffness == 0.0 or by_damping else "stiffness"
-    yield Caution(field, limits.where, f"contact.{field} = {getattr(contact, field):g} {_UNITS[field]} is more than a "
-                  f"step of {start.scene.rate:g} Hz can hold at {limits.where} ({limits.contacts} contact"
-                  f"{'s' * (limits.contacts > 1)}, effective mass {limits.mass:.3g} kg): set contact.{field} <= "
-                  f"{_down(getattr(limits, field)):g}, or rate >= {_up(limits.rate):g} Hz")
+    yield Caution(
+        field,
+        limits.where,
+        f"contact.{field} = {getattr(contact, field):g} {_UNITS[field]} is more than a "
+        f"step of {start.scene.rate:g} Hz can hold at {limits.where} ({limits.contacts} contact"
+        f"{'s' * (limits.contacts > 1)}, effective mass {limits.mass:.3g} kg): set "
+        f"contact.{field} <= "
+        f"{_down(getattr(limits, field)):g}, or rate >= {_up(limits.rate):g} Hz",
+    )
 
 
 def _sags(start: Start) -> Iterator[Caution]:
-    """Warn of static loads that sag by more than a tenth: of a shape at a contact, of the range at a joint limit."""
+    """Warn of static loads that sag by more than a tenth: of a shape at a contact, of the range at
+    a joint limit."""
     K, stops, found = start.scene.contact.stiffness, start.stops, [(0.0, -1)]
     for rows in start.supports if K > 0.0 else ():
         shares = start.loads(rows) / (K * start.thickness[rows])
@@ -430,7 +638,9 @@ def _sags(start: Start) -> Iterator[Caution]:
     touching = {int(i) for rows in start.touching for i in rows}
     for k, i in enumerate(range(start.first_stop, len(start.rows)) if K > 0.0 else ()):
         there = start.q.copy()
-        there[stops.coordinate[k]] = stops.bound[k]  # the joint is at its limit, and those behind it are fixed
+        there[stops.coordinate[k]] = stops.bound[
+            k
+        ]  # the joint is at its limit, and those behind it are fixed
         load = -float(stops.sign[k] * start.applied(there)[stops.dof[k]] / stops.arm[k])
         found += [(load / (K * float(start.thickness[i])), i)] if i not in touching else []
     share, i = max(found)
@@ -447,15 +657,23 @@ def _overdriven_friction(start: Start) -> Iterator[Caution]:
     """Warn where friction (6), an explicit damper μN/v_thr, reverses a motion within a step."""
     contact, worst, where = start.scene.contact, 2.0, ""
     for rows in start.supports:
-        root = np.sqrt(start.friction[rows] * start.loads(rows) * start.dt / contact.friction_velocity)
-        tangents = [r * row for i, r in zip(rows, root, strict=True) if r > 0.0 for row in start.slips(i)]
+        root = np.sqrt(
+            start.friction[rows] * start.loads(rows) * start.dt / contact.friction_velocity
+        )
+        tangents = [
+            r * row for i, r in zip(rows, root, strict=True) if r > 0.0 for row in start.slips(i)
+        ]
         found = start.mobility(np.array(tangents))
         if found > worst * (1.0 + ROUNDED):
             worst, where = found, start.names(rows)
     if where:
-        yield Caution("friction", where, f"friction (6) at {where} turns motion round within a step, {0.5 * worst:.3g} "
-                      "times beyond its limit μ N Δt = 2 m v_threshold: set contact.friction_velocity >= "
-                      f"{_up(contact.friction_velocity * worst / 2.0):g}, or contact.forces: implicit")
+        yield Caution(
+            "friction",
+            where,
+            f"friction (6) at {where} turns motion round within a step, {0.5 * worst:.3g} "
+            "times beyond its limit μ N Δt = 2 m v_threshold: set contact.friction_velocity >= "
+            f"{_up(contact.friction_velocity * worst / 2.0):g}, or contact.forces: implicit",
+        )
 
 
 def _up(x: float, way: Callable[[float], int] = math.ceil, slack: float = 1.0 - ROUNDED) -> float:
@@ -472,22 +690,34 @@ def _down(x: float) -> float:
 
 # What `contact.forces: implicit` chooses
 
-SAG_ALLOWED, SAG_SHARE = 1e-4, 1e-3  # m, and share of the smallest shape: largest static sag of implicit contact
+SAG_ALLOWED, SAG_SHARE = (
+    1e-4,
+    1e-3,
+)  # m, and share of the smallest shape: largest static sag of implicit contact
 SPARE_LOAD = 10.0  # times the weight of everything that moves: levers and wedges can press harder
-RELAXATION = 0.1  # s: B/K, in which an overlap fades; a shorter one would throw what lands out of its first overlap
+# s: B/K, in which an overlap fades; a shorter one would throw what lands out of its first overlap
+RELAXATION = 0.1
 STANDARD_GRAVITY = 9.81  # m/s², for scenes with less
 _UNITS = {"stiffness": "N/m", "damping": "N s/m"}
 
 
 def chosen_scene(scene: Scene) -> tuple[Scene, tuple[str, ...]]:
-    """Return the scene with the stiffness and damping of implicit contact that it does not give, and a remark on them.
+    """Return the scene with the stiffness and damping of implicit contact that it does not give,
+    and a remark on them.
 
     A scene that gives both, or has the paper's forces, is unchanged, and there is no remark.
     """
     if not scene.chosen_fields:
         return scene, ()
-    sag = min([SAG_ALLOWED, *(SAG_SHARE * solid.thin for solid in solids_of(mechanism.shapes_of(scene)).values())])
-    load = sum(body.mass for body in scene.bodies) * max(STANDARD_GRAVITY, math.hypot(*(scene.gravity or (0.0,))))
+    sag = min(
+        [
+            SAG_ALLOWED,
+            *(SAG_SHARE * solid.thin for solid in solids_of(mechanism.shapes_of(scene)).values()),
+        ]
+    )
+    load = sum(body.mass for body in scene.bodies) * max(
+        STANDARD_GRAVITY, math.hypot(*(scene.gravity or (0.0,)))
+    )
     load += scene.hand.largest_force(scene.duration) if scene.hand is not None else 0.0
     K, choice = scene.contact.stiffness, dict[str, float]()
     if "stiffness" in scene.chosen_fields:
@@ -498,4 +728,6 @@ def chosen_scene(scene: Scene) -> tuple[Scene, tuple[str, ...]]:
     contact._chosen = tuple(choice)
     listed = ", ".join(f"{name} = {value:g} {_UNITS[name]}" for name, value in choice.items())
     sags = f"; a load of {load:.3g} N sags by {in_metres(load / K)}" if K > 0.0 else ""
-    return scene.model_copy(update={"contact": contact}), (f"chosen for implicit contact: {listed}{sags}",)
+    return scene.model_copy(update={"contact": contact}), (
+        f"chosen for implicit contact: {listed}{sags}",
+    )

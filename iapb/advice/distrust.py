@@ -1,7 +1,8 @@
-"""Check the record of a run for signs of a meaningless result: energy, spin, overlap, passage and positions.
+"""Check the record of a run for signs of a meaningless result: energy, spin, overlap, passage and
+positions.
 
-Energy is compared for the whole scene, for each group of trees that touch one another, and for each tree of bodies on
-its own scale, so that a heavy neighbour hides nothing.
+Energy is compared for the whole scene, for each group of trees that touch one another, and for each
+tree of bodies on its own scale, so that a heavy neighbour hides nothing.
 """
 
 from __future__ import annotations
@@ -23,23 +24,36 @@ from iapb.scene.mechanism import mechanism_of, pairs_of, shapes_of
 from iapb.scene.model import scene_kind
 from iapb.schema import Booleans, Floats, Integers
 
-UNACCOUNTED = 0.02  # share of the available energy, or of a free momentum, that errors of a first-order step may add
+# share of the available energy, or of a free momentum, that errors of a first-order step may add
+UNACCOUNTED = 0.02
 SWING = 0.1  # the same for the motion of a linkage: its error swings to and fro
-STEADY = {"fixed", "prismatic", "planar", "free_flyer"}  # joints of trees whose motion has no such error
+STEADY = {
+    "fixed",
+    "prismatic",
+    "planar",
+    "free_flyer",
+}  # joints of trees whose motion has no such error
 DEEP = 0.5  # of the thinner shape: largest overlap of rigid bodies
 NARROW = 0.1  # of the body: a rigid body cannot pass a gap that is narrower by so much
-OVERRUN = {"paper": 0.1, "implicit": 0.04}  # of a joint's range: largest distance beyond a limit at the end, by forces
-FAST = 0.5  # of the thinner shape: a pair that moves by less in a step overlaps before one is through the other
+OVERRUN = {
+    "paper": 0.1,
+    "implicit": 0.04,
+}  # of a joint's range: largest distance beyond a limit at the end, by forces
+# of the thinner shape: a pair that moves by less in a step overlaps before one is through the other
+FAST = 0.5
 NEAR = 1e-3  # of an overlap: how far from its wall's surface its end may lie
 SLOW = 1e-6  # [m/s, rad/s] of a free body: slower motion may be rounding error
 WILD = 10.0  # factor on the farthest distance that start, speed and acceleration explain
 
 
 def distrust_of(run: Run) -> tuple[str, ...]:
-    """Return the reasons why a result is not to be trusted, from the record alone; empty if nothing is wrong."""
+    """Return the reasons why a result is not to be trusted, from the record alone; empty if nothing
+    is wrong."""
     if not (np.isfinite(run.q).all() and np.isfinite(run.v).all()):
         return ("positions or velocities are not finite",)
-    if not run.steps or [body.get("name") for body in run.scene_resolved.get("bodies", ())] != [*run.body_names]:
+    if not run.steps or [body.get("name") for body in run.scene_resolved.get("bodies", ())] != [
+        *run.body_names
+    ]:
         return ()
     with np.errstate(all="ignore"):  # the square of what exploded may overflow
         seen = _Seen(run)
@@ -54,26 +68,45 @@ class _Seen:
     """A run with its scene, made again from the record, its mechanism and its shapes."""
 
     def __init__(self, run: Run) -> None:
-        self.run, self.scene = run, scene_kind(run.scene_resolved).model_validate(run.scene_resolved)
-        self.bodies, self.mechanism, shapes = self.scene.bodies, mechanism_of(self.scene), shapes_of(self.scene)
+        self.run, self.scene = (
+            run,
+            scene_kind(run.scene_resolved).model_validate(run.scene_resolved),
+        )
+        self.bodies, self.mechanism, shapes = (
+            self.scene.bodies,
+            mechanism_of(self.scene),
+            shapes_of(self.scene),
+        )
         self.gravity = np.array([*(self.scene.gravity or ()), 0.0, 0.0, 0.0])[:3]
         self.solids = solids_of(shapes)  # by shape, without endless walls
-        self.names = [one.name for one in self.bodies for _ in one.shapes] + [wall.name for wall in self.scene.walls]
+        self.names = [one.name for one in self.bodies for _ in one.shapes] + [
+            wall.name for wall in self.scene.walls
+        ]
         pairs = pairs_of(self.scene, shapes)
         self.pairs = pairs[np.isin(pairs, [*self.solids]).all(axis=1)]
-        self.sizes = np.full(len(self.bodies) + 1, math.inf)  # smallest extent of each body; last, of the world
+        self.sizes = np.full(
+            len(self.bodies) + 1, math.inf
+        )  # smallest extent of each body; last, of the world
         for solid in (solid for solid in self.solids.values() if solid.body >= 0):
             self.sizes[solid.body] = min(self.sizes[solid.body], solid.thin)
-        # the first state that forces explain: a later part of a run begins with the state at the whole run's start
+        # the first state that forces explain: a later part of a run begins with the state at the
+        # whole run's start
         self.begin = int(run.time[0] > 0.0)
         # start, stop in v of a tool that its coupler moves without force, at times; or 0, 0
         self.carried = run.tool_dofs if run.coupling == "unilateral" else (0, 0)
 
     def trifle(self, bodies: Booleans) -> float:
-        """Negligible energy [J] of some bodies: to lift each by a thousandth of its size; and rounding of the scene."""
-        rounding = 1e-14 * float(self.run.energy["kinetic"].max(initial=0.0)) if "kinetic" in self.run.energy else 0.0
+        """Negligible energy [J] of some bodies: to lift each by a thousandth of its size; and
+        rounding of the scene."""
+        rounding = (
+            1e-14 * float(self.run.energy["kinetic"].max(initial=0.0))
+            if "kinetic" in self.run.energy
+            else 0.0
+        )
         weights = np.linalg.norm(self.gravity) * np.array([body.mass for body in self.bodies])
-        return rounding + float((1e-3 * weights * np.where(np.isinf(self.sizes), 0.0, self.sizes)[:-1])[bodies].sum())
+        return rounding + float(
+            (1e-3 * weights * np.where(np.isinf(self.sizes), 0.0, self.sizes)[:-1])[bodies].sum()
+        )
 
 
 # Energy and free motion
@@ -91,14 +124,19 @@ class _Book(NamedTuple):
 
 
 def _energy(seen: _Seen) -> Iterator[str]:
-    """Say where energy exceeds that of the start plus the work done, and whether friction did positive work."""
+    """Say where energy exceeds that of the start plus the work done, and whether friction did
+    positive work."""
     books = list(_books(seen))
     for book in books:
         k = int(np.argmax(book.excess))
         if not book.excess[k] <= book.most:  # it may be NaN
             start = "start and the work of all forces" if book.alone else "start and work"
-            yield (f"{f'the energy of {book.name}' if book.name else 'its energy'} is {book.excess[k]:.3g} J above "
-                   f"{start} at {seen.run.time[k - len(book.excess)]:.4g} s, where these are {book.at_hand:.3g} J")
+            yield (
+                f"{f'the energy of {book.name}' if book.name else 'its energy'} is "
+                f"{book.excess[k]:.3g} J above "
+                f"{start} at {seen.run.time[k - len(book.excess)]:.4g} s, where these are "
+                f"{book.at_hand:.3g} J"
+            )
             break
     for book in books:
         most = float(book.friction.max(initial=0.0))
@@ -108,38 +146,60 @@ def _energy(seen: _Seen) -> Iterator[str]:
 
 
 def _books(seen: _Seen) -> Iterator[_Book]:
-    """Yield the books of the scene, of groups of trees that touch, and of single trees, where there is a balance."""
+    """Yield the books of the scene, of groups of trees that touch, and of single trees, where there
+    is a balance."""
     run, mechanism, begin = seen.run, seen.mechanism, seen.begin
-    trees, ranges, ledgers = mechanism.tree_of_body, mechanism.tree_dofs, dict[int, dict[str, Floats]]()
+    trees, ranges, ledgers = (
+        mechanism.tree_of_body,
+        mechanism.tree_dofs,
+        dict[int, dict[str, Floats]](),
+    )
     roots = np.searchsorted(trees, np.arange(len(ranges)))
     if {"kinetic", "potential", "hand_work", "coupling_work"} <= set(run.energy):
         yield _balance(seen, run.energy, 0, trees >= 0, "")
     moving = [t for t, (start, stop) in enumerate(ranges) if start < stop and run.steps > begin]
     for t in (t for t in moving if ranges[t] != seen.carried):
-        alone, dofs, q = mechanism.alone(t), slice(*ranges[t]), int(mechanism.arrays.q_start[roots[t]])
+        alone, dofs, q = (
+            mechanism.alone(t),
+            slice(*ranges[t]),
+            int(mechanism.arrays.q_start[roots[t]]),
+        )
         forces = {name: getattr(run, f"{name}_force")[begin:, dofs] for name in FORCES}
         states = run.q[begin:, q : q + alone.nq], run.v[begin:, dofs]
         impulse = np.ascontiguousarray(run.impulse[begin:, dofs])
-        ledgers[t] = energy_ledger(alone, seen.gravity, *states, forces, impulse, straight=moved_straight(run))
+        ledgers[t] = energy_ledger(
+            alone, seen.gravity, *states, forces, impulse, straight=moved_straight(run)
+        )
     touching = np.stack([run.contacts.body_a, run.contacts.body_b])[:, run.contacts.body_b >= 0]
     group = joined(len(ranges), np.unique(trees[touching], axis=1).T)
     for chosen in (np.flatnonzero(group == g) for g in np.unique(group)):
         members = [t for t in chosen.tolist() if t in moving]
         if members and len(chosen) < len(group) and all(t in ledgers for t in members):
-            energy = {name: np.sum([ledgers[t][name] for t in members], axis=0) for name in ledgers[members[0]]}
-            names = [run.body_names[roots[t]] for t in members[:3]] + ["others"] * (len(members) > 3)
+            energy = {
+                name: np.sum([ledgers[t][name] for t in members], axis=0)
+                for name in ledgers[members[0]]
+            }
+            names = [run.body_names[roots[t]] for t in members[:3]] + ["others"] * (
+                len(members) > 3
+            )
             yield _balance(seen, energy, begin, np.isin(trees, chosen), " and ".join(names))
     for t, energy in ledgers.items():
         alone, gain = mechanism.alone(t), energy["integration_residual"]
-        steady = alone.has_constant_mass_matrix and {body.joint.kind for body in alone.bodies} <= STEADY
+        steady = (
+            alone.has_constant_mass_matrix and {body.joint.kind for body in alone.bodies} <= STEADY
+        )
         gain = gain - np.minimum.accumulate(np.minimum(gain, 0.0)) if steady else gain
         taken = (energy["penalty_work"], energy["friction_work"], -energy["impact_loss"])
         at_hand = _at_hand(energy) + sum(float(work.max(initial=0.0)) for work in taken)
         most = (UNACCOUNTED if steady else SWING) * at_hand + seen.trifle(trees == t)
-        yield _Book(run.body_names[roots[t]], energy["friction_work"], gain, at_hand, most, alone=True)
+        yield _Book(
+            run.body_names[roots[t]], energy["friction_work"], gain, at_hand, most, alone=True
+        )
 
 
-def _balance(seen: _Seen, energy: dict[str, Floats], begin: int, bodies: Booleans, name: str) -> _Book:
+def _balance(
+    seen: _Seen, energy: dict[str, Floats], begin: int, bodies: Booleans, name: str
+) -> _Book:
     """Return the book of bodies that nothing else touches but walls, hand and coupling."""
     contacts = seen.run.contacts
     rows = slice(*contacts.offsets[begin : begin + 2].tolist())
@@ -152,31 +212,53 @@ def _balance(seen: _Seen, energy: dict[str, Floats], begin: int, bodies: Boolean
 
 
 def _at_hand(energy: dict[str, Floats]) -> float:
-    """Return the energy available [J]: at the start, by loss of height, and by the work of hand and coupling."""
-    worked = sum(float(np.abs(energy[name]).max(initial=0.0)) for name in ("hand_work", "coupling_work"))
+    """Return the energy available [J]: at the start, by loss of height, and by the work of hand and
+    coupling."""
+    worked = sum(
+        float(np.abs(energy[name]).max(initial=0.0)) for name in ("hand_work", "coupling_work")
+    )
     return float(energy["kinetic"][0] + energy["potential"][0] - energy["potential"].min()) + worked
 
 
 def _spun(seen: _Seen) -> Iterator[str]:
-    """Say which free body that carries nothing changes its spin or speed, gravity apart, while no force acts on it."""
+    """Say which free body that carries nothing changes its spin or speed, gravity apart, while no
+    force acts on it."""
     run, begin, start, parents = seen.run, seen.begin, 0, {body.parent for body in seen.bodies}
     forces = [run.impulse, *(getattr(run, f"{name}_force") for name in FORCES)]
     for b, body in enumerate(seen.bodies):
         dofs = slice(start, start := start + KINDS[body.joint].nv)
-        free = body.joint in ("planar", "free_flyer") and body.parent == WORLD and not any(body.joint_damping)
-        if not free or body.name in parents or (dofs.start, dofs.stop) == seen.carried or run.steps <= begin:
+        free = (
+            body.joint in ("planar", "free_flyer")
+            and body.parent == WORLD
+            and not any(body.joint_damping)
+        )
+        if (
+            not free
+            or body.name in parents
+            or (dofs.start, dofs.stop) == seen.carried
+            or run.steps <= begin
+        ):
             continue
-        alone = ~np.any([force[begin:, dofs].any(axis=1) for force in forces], axis=0)[:, None, None]
+        alone = ~np.any([force[begin:, dofs].any(axis=1) for force in forces], axis=0)[
+            :, None, None
+        ]
         v, flat = run.v[begin:, dofs], body.joint == "planar"
         turn = _frames(run, b, np.arange(begin, run.steps + 1))[0]
-        turning, origin = (v * [0.0, 0.0, 1.0], v * [1.0, 1.0, 0.0]) if flat else (v[:, 3:], v[:, :3])
+        turning, origin = (
+            (v * [0.0, 0.0, 1.0], v * [1.0, 1.0, 0.0]) if flat else (v[:, 3:], v[:, :3])
+        )
         inertia = np.eye(3) if flat else inertia_matrix(body.inertia)
         spin = turn @ (turning @ inertia / np.linalg.norm(inertia, 2))[..., None]  # R I w / |I|
         arm = np.cross(turning, np.array([*body.center_of_mass, 0.0])[:3])
-        speed = turn @ arm[..., None] + (rotation_of((0.0, 0.0, body.angle)) if flat else turn) @ origin[..., None]
+        speed = (
+            turn @ arm[..., None]
+            + (rotation_of((0.0, 0.0, body.angle)) if flat else turn) @ origin[..., None]
+        )
         falls, fastest = seen.gravity[:, None] * run.dt, np.linalg.norm(origin, axis=1).max()
         for what, moved, due, most in (("spin", spin, 0.0, 0.0), ("speed", speed, falls, fastest)):
-            drift = np.linalg.norm(np.cumsum(alone * (np.diff(moved, axis=0) - due), axis=0), axis=1).max()
+            drift = np.linalg.norm(
+                np.cumsum(alone * (np.diff(moved, axis=0) - due), axis=0), axis=1
+            ).max()
             share = float(drift / (max(np.linalg.norm(moved, axis=1).max(), most) + SLOW))
             if not share <= UNACCOUNTED:
                 yield f"the {what} of {body.name} changes by {100.0 * share:.3g} % although nothing touches it"
@@ -187,29 +269,43 @@ def _spun(seen: _Seen) -> Iterator[str]:
 
 
 def _sank(seen: _Seen) -> Iterator[str]:
-    """Say where two bodies overlap by more than half of the thinner one, or a body by all of a wall's thickness."""
+    """Say where two bodies overlap by more than half of the thinner one, or a body by all of a
+    wall's thickness."""
     run, table = seen.run, seen.run.contacts
     thinner = np.minimum(seen.sizes[table.body_a], seen.sizes[table.body_b])
     most = DEEP * thinner
     for wall in (solid for solid in seen.solids.values() if solid.body < 0):
         rows = np.flatnonzero((table.body_b < 0) & (table.gap < -wall.thin))
-        ends = table.point[rows] - 0.5 * table.gap[rows, None] * table.normal[rows]  # on the surface of their wall
+        ends = (
+            table.point[rows] - 0.5 * table.gap[rows, None] * table.normal[rows]
+        )  # on the surface of their wall
         rows = rows[np.abs(wall.height(ends)) < -NEAR * table.gap[rows]]
-        thinner[rows], most[rows] = np.minimum(thinner[rows], wall.thin), np.minimum(most[rows], wall.thin)
+        thinner[rows], most[rows] = (
+            np.minimum(thinner[rows], wall.thin),
+            np.minimum(most[rows], wall.thin),
+        )
     i = int(np.argmin(table.gap / most)) if len(table.gap) else -1
     if i >= 0 and not -table.gap[i] <= most[i]:
         k = int(np.searchsorted(table.offsets, i, "right")) - 1
-        a, b = (run.body_names[x] if x >= 0 else "a wall" for x in (table.body_a[i], table.body_b[i]))
+        a, b = (
+            run.body_names[x] if x >= 0 else "a wall" for x in (table.body_a[i], table.body_b[i])
+        )
         b += " (or the limit of its joint)" if seen.bodies[table.body_a[i]].joint_limits else ""
         share = "all" if -table.gap[i] >= thinner[i] else "more than half"
-        yield (f"{a} and {b} overlap by {in_metres(-float(table.gap[i]))} at {run.time[k]:.4g} s, {share} of "
-               f"{in_metres(float(thinner[i]))}")
+        yield (
+            f"{a} and {b} overlap by {in_metres(-float(table.gap[i]))} at {run.time[k]:.4g} s, "
+            f"{share} of "
+            f"{in_metres(float(thinner[i]))}"
+        )
 
 
 def _passed(seen: _Seen) -> Iterator[str]:
-    """Say which body is the first to pass through a wall or another body within one step (see `_crosses`)."""
+    """Say which body is the first to pass through a wall or another body within one step (see
+    `_crosses`)."""
     run, first, said = seen.run, seen.run.steps, ""
-    moved = np.zeros((run.steps, len(seen.sizes)))  # how far any point of each body moves [m]; last, the world
+    moved = np.zeros(
+        (run.steps, len(seen.sizes))
+    )  # how far any point of each body moves [m]; last, the world
     for b in range(len(run.body_names)):
         turn, origin = _frames(run, b, np.arange(run.steps + 1))
         reach = max((solid.reach for solid in seen.solids.values() if solid.body == b), default=0.0)
@@ -222,7 +318,9 @@ def _passed(seen: _Seen) -> Iterator[str]:
         if top[one.body] + top[other.body] <= far:
             continue
         way = moved[:first, one.body] + moved[:first, other.body]
-        middle = other.points[0, : places.shape[2]] if other.body < 0 else places[:first, other.body]
+        middle = (
+            other.points[0, : places.shape[2]] if other.body < 0 else places[:first, other.body]
+        )
         apart = np.linalg.norm(places[:first, one.body] - middle, axis=1) - one.reach - other.reach
         k = np.flatnonzero((way > far) & (way >= apart))
         through = k[_crosses(run, one, other, k) | _crosses(run, other, one, k)] if len(k) else k
@@ -233,11 +331,17 @@ def _passed(seen: _Seen) -> Iterator[str]:
 
 
 def _crosses(run: Run, one: Solid, other: Solid, k: Integers) -> Booleans:
-    """Whether the centre or a corner of one shape, moving straight in the frame of another, enters and leaves it."""
+    """Whether the centre or a corner of one shape, moving straight in the frame of another, enters
+    and leaves it."""
     ours, theirs = ([_frames(run, solid.body, at) for at in (k, k + 1)] for solid in (one, other))
-    before, after = ((one.points @ np.swapaxes(turned, 1, 2) + (at - origin)[:, None]) @ turn
-                     for (turned, at), (turn, origin) in zip(ours, theirs, strict=True))
-    bends = [np.linalg.norm(end[0] - start[0], axis=(1, 2))[:, None] ** 2 / 8.0 for start, end in (ours, theirs)]
+    before, after = (
+        (one.points @ np.swapaxes(turned, 1, 2) + (at - origin)[:, None]) @ turn
+        for (turned, at), (turn, origin) in zip(ours, theirs, strict=True)
+    )
+    bends = [
+        np.linalg.norm(end[0] - start[0], axis=(1, 2))[:, None] ** 2 / 8.0
+        for start, end in (ours, theirs)
+    ]
     arc = np.linalg.norm(one.points, axis=1) * bends[0] + np.linalg.norm(before, axis=2) * bends[1]
     return np.asarray(other.crossed(before, after, arc, one.radius).any(axis=1))
 
@@ -248,7 +352,8 @@ def _places(run: Run) -> Floats:
 
 
 def _frames(run: Run, body: int, at: Integers) -> tuple[Floats, Floats]:
-    """Return axes (n, 3, 3), as columns, and origin (n, 3) of a body, or of the world (-1), at some instants."""
+    """Return axes (n, 3, 3), as columns, and origin (n, 3) of a body, or of the world (-1), at some
+    instants."""
     turn, origin = np.tile(np.eye(3), (len(at), 1, 1)), np.zeros((len(at), 3))
     pose = run.pose[at, body]
     if body >= 0 and run.pose.shape[2] == 3:
@@ -262,14 +367,23 @@ def _frames(run: Run, body: int, at: Integers) -> tuple[Floats, Floats]:
 
 
 def _squeezed(seen: _Seen) -> Iterator[str]:
-    """Say which body moves on by more than its size in a gap that is a tenth of its size too narrow."""
+    """Say which body moves on by more than its size in a gap that is a tenth of its size too
+    narrow."""
     run, table = seen.run, seen.run.contacts
     for b, size in enumerate(seen.sizes[:-1].tolist()):
         rows = np.flatnonzero((table.body_a == b) & (table.body_b < 0) & (table.gap < 0.0))
-        if not (table.gap[rows] < -0.5 * NARROW * size).any():  # of two opposed contacts one has half of the overlap
+        if not (
+            table.gap[rows] < -0.5 * NARROW * size
+        ).any():  # of two opposed contacts one has half of the overlap
             continue
-        step, caught, widest = np.searchsorted(table.offsets, rows, "right") - 1, [np.zeros(0, np.int64)], 0.0
-        for apart in range(1, int(np.bincount(step - step[0]).max())):  # the contacts of a step are consecutive
+        step, caught, widest = (
+            np.searchsorted(table.offsets, rows, "right") - 1,
+            [np.zeros(0, np.int64)],
+            0.0,
+        )
+        for apart in range(
+            1, int(np.bincount(step - step[0]).max())
+        ):  # the contacts of a step are consecutive
             one, other = rows[:-apart], rows[apart:]
             narrow = -(table.gap[one] + table.gap[other])
             facing = np.einsum("ij,ij->i", table.normal[one], table.normal[other]) < -0.9
@@ -279,8 +393,11 @@ def _squeezed(seen: _Seen) -> Iterator[str]:
         places = _places(run)[np.unique(np.concatenate(caught)), b]
         far = float(np.linalg.norm(places - places[:1], axis=1).max(initial=0.0))
         if far > size:
-            yield (f"{run.body_names[b]} goes on by {in_metres(far)} in a gap that is {in_metres(widest)} narrower "
-                   "than it")
+            yield (
+                f"{run.body_names[b]} goes on by {in_metres(far)} in a gap that is "
+                f"{in_metres(widest)} narrower "
+                "than it"
+            )
             return
 
 
@@ -291,20 +408,29 @@ def _flew(seen: _Seen) -> Iterator[str]:
     time, masses = float(run.time[-1]), [body.mass for body in seen.bodies if body.mass]
     push = float(np.linalg.norm(run.hand_force, axis=1).max(initial=0.0)) / min(masses, default=1.0)
     reach = float(np.abs(run.q[0]).max() + seen.sizes[np.isfinite(seen.sizes)].max(initial=0.0))
-    reach += float(np.abs(run.v[0]).max() * time + 0.5 * (np.linalg.norm(seen.gravity) + push) * time**2)
+    reach += float(
+        np.abs(run.v[0]).max() * time + 0.5 * (np.linalg.norm(seen.gravity) + push) * time**2
+    )
     if lengths and not moved.max() <= WILD * reach:
         name = run.coordinate_names[lengths[int(moved.argmax())]]
         yield f"{name} moves by {in_metres(float(moved.max()))}, where {in_metres(reach)} can be explained"
 
 
 def _overran(seen: _Seen) -> Iterator[str]:
-    """Say which joint goes beyond a limit by more than half of its range, or by more than OVERRUN at the end."""
+    """Say which joint goes beyond a limit by more than half of its range, or by more than OVERRUN
+    at the end."""
     run, most = seen.run, OVERRUN[seen.scene.contact.forces]
-    limited = [(i, body.joint_limits) for i, body in zip(seen.mechanism.arrays.q_start, seen.bodies, strict=True)]
+    limited = [
+        (i, body.joint_limits)
+        for i, body in zip(seen.mechanism.arrays.q_start, seen.bodies, strict=True)
+    ]
     for i, (low, high) in ((i, limits) for i, limits in limited if limits):
         beyond = np.maximum(low - run.q[:, i], run.q[:, i] - high) / (high - low)
         k = len(beyond) - 1 if beyond[-1] > most else int(beyond.argmax())
         if beyond[k] > (most if k == len(beyond) - 1 else DEEP):
-            yield (f"{run.coordinate_names[i]} is {run.q[k, i]:.3g} at {run.time[k]:.4g} s, beyond its limits {low:g} "
-                   f"and {high:g} by {beyond[k]:.3g} times their range")
+            yield (
+                f"{run.coordinate_names[i]} is {run.q[k, i]:.3g} at {run.time[k]:.4g} s, beyond "
+                f"its limits {low:g} "
+                f"and {high:g} by {beyond[k]:.3g} times their range"
+            )
             return

@@ -1,4 +1,5 @@
-"""Shapes as points and half-spaces, for the questions that advice asks: how thin, how high above, passed through."""
+"""Shapes as points and half-spaces, for the questions that advice asks: how thin, how high above,
+passed through."""
 
 from __future__ import annotations
 
@@ -14,7 +15,8 @@ GRAZED = 0.1  # of a shape's thickness: a path that enters it by less does not p
 
 
 class Solid(NamedTuple):
-    """A convex shape in the frame of its body (-1: the world): a ball or circle, or what faces n·x <= offset bound."""
+    """A convex shape in the frame of its body (-1: the world): a ball or circle, or what faces n·x
+    <= offset bound."""
 
     body: int
     points: Floats  # (p, 3) its centre, then its corners
@@ -28,7 +30,9 @@ class Solid(NamedTuple):
     def of(cls, shapes: Shapes, i: int) -> Solid:
         """Return shape number i of a scene, which must not be endless."""
         body, radius, none = int(shapes.body[i]), float(shapes.radius[i]), np.zeros(0)
-        corners = np.pad(shapes.vertices[shapes.first[i] : shapes.first[i] + shapes.count[i]], ((0, 0), (0, 1)))
+        corners = np.pad(
+            shapes.vertices[shapes.first[i] : shapes.first[i] + shapes.count[i]], ((0, 0), (0, 1))
+        )
         centre = corners.mean(axis=0) if len(corners) else shapes.center[i]
         middle = centre if body < 0 else np.zeros(3)
         if radius > 0.0:
@@ -43,32 +47,49 @@ class Solid(NamedTuple):
             normals = np.vstack([shapes.axes[i].T, -shapes.axes[i].T])
         points = np.vstack([centre, corners])
         over, far = points @ normals.T, float(np.linalg.norm(points - middle, axis=1).max())
-        return cls(body, points, normals, over.max(axis=0), 0.0, float(np.ptp(over, axis=0).min()), far)
+        return cls(
+            body, points, normals, over.max(axis=0), 0.0, float(np.ptp(over, axis=0).min()), far
+        )
 
     def height(self, points: Floats) -> Floats:
-        """Return a height (n,) of points (n, 2 or 3) over the surface: zero on it, negative inside."""
+        """Return a height (n,) of points (n, 2 or 3) over the surface: zero on it, negative
+        inside."""
         if self.radius > 0.0:
             return np.linalg.norm(points - self.points[0, : points.shape[1]], axis=1) - self.radius
-        return np.asarray((points @ self.normals[:, : points.shape[1]].T - self.offsets).max(axis=1))
+        return np.asarray(
+            (points @ self.normals[:, : points.shape[1]].T - self.offsets).max(axis=1)
+        )
 
     def crossed(self, before: Floats, after: Floats, arc: Floats, radius: float) -> Booleans:
-        """Whether straight paths enter and leave the shape's core, what is deeper than `GRAZED` and a path's `arc`.
+        """Whether straight paths enter and leave the shape's core, what is deeper than `GRAZED` and
+        a path's `arc`.
 
-        radius : of the ball about the moving point, or 0. Two balls cross if they overlap by half of the smaller one.
+        radius : of the ball about the moving point, or 0. Two balls cross if they overlap by half
+            of the smaller one.
         """
         arc = arc + GRAZED * self.thin
         if self.radius > 0.0:
-            core = (max(self.radius, radius) + GRAZED * self.thin if radius > 0.0 else self.radius) - arc
+            core = (
+                max(self.radius, radius) + GRAZED * self.thin if radius > 0.0 else self.radius
+            ) - arc
             start, end, way = before - self.points[0], after - self.points[0], after - before
-            share = np.clip(-(start * way).sum(axis=-1) / np.maximum((way * way).sum(axis=-1), 1e-300), 0.0, 1.0)
-            first, last, least = (np.linalg.norm(x, axis=-1) for x in (start, end, start + share[..., None] * way))
+            share = np.clip(
+                -(start * way).sum(axis=-1) / np.maximum((way * way).sum(axis=-1), 1e-300), 0.0, 1.0
+            )
+            first, last, least = (
+                np.linalg.norm(x, axis=-1) for x in (start, end, start + share[..., None] * way)
+            )
             return np.asarray((least < core) & (first >= core) & (last >= core))
-        before, after = (at @ self.normals.T - self.offsets + arc[..., None] for at in (before, after))
+        before, after = (
+            at @ self.normals.T - self.offsets + arc[..., None] for at in (before, after)
+        )
         share = before / np.where(before == after, 1.0, before - after)
         enters = np.where((before > 0.0) & (after <= 0.0), share, 0.0).max(axis=-1)
         leaves = np.where((before <= 0.0) & (after > 0.0), share, 1.0).min(axis=-1)
         outside = (before.max(axis=-1) > 0.0) & (after.max(axis=-1) > 0.0)
-        return np.asarray(outside & ~((before > 0.0) & (after > 0.0)).any(axis=-1) & (leaves > enters))
+        return np.asarray(
+            outside & ~((before > 0.0) & (after > 0.0)).any(axis=-1) & (leaves > enters)
+        )
 
 
 def solids_of(shapes: Shapes) -> dict[int, Solid]:

@@ -1,8 +1,8 @@
 """Shapes of a scene and the arrays that the narrow phase reads and writes.
 
-The planar shapes are half-plane, circle and convex polygon (a planar box is a polygon); the spatial shapes are
-half-space, sphere and box. Every shape belongs to a body and is given in the frame of that body. Body -1 is the
-static world; its frame is the world frame.
+The planar shapes are half-plane, circle and convex polygon (a planar box is a polygon); the spatial
+shapes are half-space, sphere and box. Every shape belongs to a body and is given in the frame of
+that body. Body -1 is the static world; its frame is the world frame.
 """
 
 from __future__ import annotations
@@ -21,26 +21,32 @@ HALF_SPACE, SPHERE, BOX = 3, 4, 5
 ENDLESS = (HALF_PLANE, HALF_SPACE)  # always of the static world
 WORLD = -1  # the body index of the static world
 
-# Largest number of contacts of one pair: a face on a face keeps four, a box on a half-space has eight corners.
+# Largest number of contacts of one pair: a face on a face keeps four, a box on a half-space has
+# eight corners.
 BOX_PAIR_CONTACTS, BOX_CORNERS = 4, 8
 # Extra rows of the buffer: clipping a face writes all corners of the overlap before it keeps four.
 CLIPPING_ROOM = 24
-# In a scene with many shapes not all pairs can touch at once: `CONTACTS_PER_SHAPE` is six neighbours with four
-# contacts each. Up to `SMALL_CAPACITY` contacts the buffer has room for the contacts of every pair.
+# In a scene with many shapes not all pairs can touch at once: `CONTACTS_PER_SHAPE` is six
+# neighbours with four contacts each. Up to `SMALL_CAPACITY` contacts the buffer has room for the
+# contacts of every pair.
 CONTACTS_PER_SHAPE, SMALL_CAPACITY = 24, 4096
 
 
 class Shapes(NamedTuple):
-    """All shapes of a scene, n of them with m vertices in total, as contiguous arrays for the kernels."""
+    """All shapes of a scene, n of them with m vertices in total, as contiguous arrays for the
+    kernels."""
 
     kind: Indices  # (n,) HALF_PLANE, CIRCLE, POLYGON, HALF_SPACE, SPHERE or BOX
     body: Indices  # (n,) body that carries the shape, -1 = the static world
     radius: Floats  # (n,) [m] of a circle or sphere, else 0
     first: Indices  # (n,) row of `vertices` where the shape begins
     count: Indices  # type: ignore[assignment]  # (n,) rows: half-plane 2, circle 1, polygon >= 3, in space 0
-    vertices: Floats  # (m, 2) [m]; half-plane: point, unit outward normal; circle: centre; polygon: CCW
+    vertices: (
+        Floats  # (m, 2) [m]; half-plane: point, unit outward normal; circle: centre; polygon: CCW
+    )
     center: Floats  # (n, 3) [m] of a circle, sphere or box, point of a half-space; else 0
-    axes: Floats  # (n, 3, 3) box: its axes as columns; half-space: column 2 is the unit outward normal
+    # (n, 3, 3) box: its axes as columns; half-space: column 2 is the unit outward normal
+    axes: Floats
     half_size: Floats  # (n, 3) [m] of a box, along its axes
     space: Any  # whether they are shapes in space (`iapb.compiled.flag`)
     polygons: Any  # whether one of them is a polygon
@@ -48,9 +54,11 @@ class Shapes(NamedTuple):
 
 
 class ContactBuffer(NamedTuple):
-    """Contacts of one step in arrays of a fixed capacity; the caller keeps the number of rows in use.
+    """Contacts of one step in arrays of a fixed capacity; the caller keeps the number of rows in
+    use.
 
-    `detect` writes the geometry, up to `gap`. Later kernels of the step write the fields after `gap`.
+    `detect` writes the geometry, up to `gap`. Later kernels of the step write the fields after
+    `gap`.
     """
 
     shape_a: Annotated[Indices, "contact"]
@@ -58,13 +66,17 @@ class ContactBuffer(NamedTuple):
     body_a: Annotated[Indices, "contact"]  # moving body that the normal points into
     body_b: Annotated[Indices, "contact"]  # other body, -1 = the static world
     feature: Annotated[Integers, "contact"]  # which vertex and edge touch; stable while they do
-    point: Annotated[Floats, "contact 3"]  # [m] world, midway between the two surfaces along the normal
+    point: Annotated[
+        Floats, "contact 3"
+    ]  # [m] world, midway between the two surfaces along the normal
     normal: Annotated[Floats, "contact 3"]  # unit, from b into a
     gap: Annotated[Floats, "contact"]  # [m] negative = overlap
     is_new: Annotated[Booleans, "contact"]  # not a contact of the previous step
     collides: Annotated[Booleans, "contact"]  # enters the impact of this step
     normal_velocity: Annotated[Floats, "contact"]  # [m/s] positive separates
-    tangential_velocity: Annotated[Floats, "contact 3"]  # [m/s] of a relative to b, orthogonal to the normal
+    tangential_velocity: Annotated[
+        Floats, "contact 3"
+    ]  # [m/s] of a relative to b, orthogonal to the normal
     normal_force: Annotated[Floats, "contact"]  # [N] on a along the normal
     friction_force: Annotated[Floats, "contact 3"]  # [N] on a
     mark: Annotated[States, "contact"]  # scratch of the clustering
@@ -85,21 +97,31 @@ class Shape(NamedTuple):
 
 def make_shapes(given: Sequence[Shape], space: bool) -> Shapes:
     """Return the arrays of the given shapes in their order; `space`: they are shapes in space."""
-    kind, body, radius, vertices, center, axes, half_size = zip(*given, strict=True) if given else [()] * 7
+    kind, body, radius, vertices, center, axes, half_size = (
+        zip(*given, strict=True) if given else [()] * 7
+    )
     count, n = np.array([len(rows) for rows in vertices], np.int32), len(given)
     return Shapes(
-        np.array(kind, np.int32), np.array(body, np.int32), np.array(radius, float),
-        (np.cumsum(count) - count).astype(np.int32), count, np.concatenate([np.zeros((0, 2)), *vertices]),
-        np.array(center, float).reshape(n, 3), np.array(axes, float).reshape(n, 3, 3),
-        np.array(half_size, float).reshape(n, 3), flag(space), flag(POLYGON in kind),
-        flag(sum(one in (CIRCLE, SPHERE) for one in kind) > 1))
+        np.array(kind, np.int32),
+        np.array(body, np.int32),
+        np.array(radius, float),
+        (np.cumsum(count) - count).astype(np.int32),
+        count,
+        np.concatenate([np.zeros((0, 2)), *vertices]),
+        np.array(center, float).reshape(n, 3),
+        np.array(axes, float).reshape(n, 3, 3),
+        np.array(half_size, float).reshape(n, 3),
+        flag(space),
+        flag(POLYGON in kind),
+        flag(sum(one in (CIRCLE, SPHERE) for one in kind) > 1),
+    )
 
 
 def candidate_pairs(shapes: Shapes) -> Indices:
     """Return the pairs (k, 2) of shape indices (a, b) to test.
 
-    The bodies of a pair differ and shape a moves. Of two moving bodies the one with the smaller index is a, so that all
-    contacts of two bodies have normals of equal sense.
+    The bodies of a pair differ and shape a moves. Of two moving bodies the one with the smaller
+    index is a, so that all contacts of two bodies have normals of equal sense.
     """
     i, j = np.triu_indices(len(shapes.kind), 1)
     one, other = shapes.body[i], shapes.body[j]
@@ -111,13 +133,23 @@ def candidate_pairs(shapes: Shapes) -> Indices:
 def contact_capacity(shapes: Shapes, pairs: Indices) -> int:
     """Return a capacity that `detect` does not exceed for these pairs (at least 1).
 
-    Up to SMALL_CAPACITY contacts this is certain. Above, the capacity is CONTACTS_PER_SHAPE contacts per shape, which
-    is enough unless many shapes overlap one another.
+    Up to SMALL_CAPACITY contacts this is certain. Above, the capacity is CONTACTS_PER_SHAPE
+    contacts per shape, which is enough unless many shapes overlap one another.
     """
     a, b = shapes.kind[pairs].T
     alike = a == b
-    total = int(np.select([b == HALF_PLANE, (b == HALF_SPACE) & (a == BOX), alike & (a == BOX), alike & (a == POLYGON)],
-                          [shapes.count[pairs[:, 0]], BOX_CORNERS, BOX_PAIR_CONTACTS, 2], 1).sum())
+    total = int(
+        np.select(
+            [
+                b == HALF_PLANE,
+                (b == HALF_SPACE) & (a == BOX),
+                alike & (a == BOX),
+                alike & (a == POLYGON),
+            ],
+            [shapes.count[pairs[:, 0]], BOX_CORNERS, BOX_PAIR_CONTACTS, 2],
+            1,
+        ).sum()
+    )
     if total > SMALL_CAPACITY:
         total = min(total, max(SMALL_CAPACITY, CONTACTS_PER_SHAPE * len(shapes.kind)))
     return max(total + CLIPPING_ROOM * bool(np.any(shapes.kind == BOX)), 1)

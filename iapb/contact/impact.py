@@ -1,7 +1,9 @@
-"""Resolve a simultaneous impact: equations (19)-(21), in the form that stays passive in floating point.
+"""Resolve a simultaneous impact: equations (19)-(21), in the form that stays passive in floating
+point.
 
-With M = L Lᵀ, u = Lᵀ v and A = J L⁻ᵀ the paper's (21) is u⁺ = u − (1 + e) P u, P the orthogonal projector onto
-the row space of A, which is applied through an orthonormal basis. `verification.methods` has the formulas as printed.
+With M = L Lᵀ, u = Lᵀ v and A = J L⁻ᵀ the paper's (21) is u⁺ = u − (1 + e) P u, P the orthogonal
+projector onto the row space of A, which is applied through an orthonormal basis.
+`verification.methods` has the formulas as printed.
 """
 
 from __future__ import annotations
@@ -29,9 +31,15 @@ from iapb.schema import Floats, zeros_of
 
 Arrays = tuple[Floats, Floats, Floats]  # M (n, d, d), J (n, c, d), v (n, d)
 METHODS = ("factored", "poisson")
-NEWTON, POISSON, COULOMB = "Newton, equality", "Poisson, two LCPs", "Newton, equality, with Coulomb friction"
+NEWTON, POISSON, COULOMB = (
+    "Newton, equality",
+    "Poisson, two LCPs",
+    "Newton, equality, with Coulomb friction",
+)
 _STATUS = "complete", "budget", "cancelled", "reduced", "not solved"  # the kernel's codes
-_ENTRIES = {law: Entry(resolve_each) for law in (NEWTON, POISSON, COULOMB)}  # each compiles only what its law needs
+_ENTRIES = {
+    law: Entry(resolve_each) for law in (NEWTON, POISSON, COULOMB)
+}  # each compiles only what its law needs
 _ONE = "mass_matrix", "contact_jacobian", "velocity"
 _MANY = "mass_matrices", "contact_jacobians", "velocities"
 _DOUBLE = np.dtype(np.float64)
@@ -46,28 +54,33 @@ class Impact(NamedTuple):
     ----------
     velocity : (d,) generalized velocity v⁺ after the impact [m/s, rad/s].
     generalized_impulse : (d,) M(v⁺ − v⁻) = Jᵀp [N s, N m s]; with friction Jᵀp + Tᵀp_t.
-    impulses : (c,) p along the contact normals [N s]; a positive value pushes. With redundant rows p is not unique.
-        Poisson's law returns the non-negative p that it found; with friction p is non-negative if non-negative
-        impulses can produce the motion; else it is the p of least norm.
-    rank : number of independent rows that were used; for Poisson's law, number of contacts that push.
+    impulses : (c,) p along the contact normals [N s]; a positive value pushes. With redundant rows
+        p is not unique. Poisson's law returns the non-negative p that it found; with friction p is
+        non-negative if non-negative impulses can produce the motion; else it is the p of least
+        norm.
+    rank : number of independent rows that were used; for Poisson's law, number of contacts that
+        push.
     energy_change : KE⁺ − KE⁻ [J] of the rounded velocities, evaluated in double-double arithmetic.
-    energy_interval : (lower, upper) [J], bounds of KE⁺ − KE⁻ in real arithmetic for the given M and v⁻ and the
-        returned v⁺. With the clamp on, the upper bound is never above 0.
-    clamp : factor in [0, 1] by which the final energy clamp scaled the change of velocity; 1 = inactive.
-    status : ``"complete"``; ``"budget"``: the row budget stopped the method early; ``"not solved"``: a contact still
-        closes after Poisson's law by more than 1e-6 of the largest |J v⁻|, which nearly opposed rows and κ(M) from
-        1e10 can cause (the energy does not rise in this case either);
-        ``"reduced"``: no p_t that obeys Coulomb's law was found (there may be none). p_t then maximizes the
-        dissipation within the friction limits of the frictionless impact. It stays in the friction cones, and
-        passivity and restitution still hold.
-        ``"cancelled"``: no change of velocity without an energy gain was found, so v⁺ = v⁻, or the entries of v differ
-        by more than 2^1000 in size, so that scaling rounded the smallest.
+    energy_interval : (lower, upper) [J], bounds of KE⁺ − KE⁻ in real arithmetic for the given M and
+        v⁻ and the returned v⁺. With the clamp on, the upper bound is never above 0.
+    clamp : factor in [0, 1] by which the final energy clamp scaled the change of velocity; 1 =
+        inactive.
+    status : ``"complete"``; ``"budget"``: the row budget stopped the method early; ``"not
+        solved"``: a contact still closes after Poisson's law by more than 1e-6 of the largest |J
+        v⁻|, which nearly opposed rows and κ(M) from 1e10 can cause (the energy does not rise in
+        this case either); ``"reduced"``: no p_t that obeys Coulomb's law was found (there may be
+        none). p_t then maximizes the dissipation within the friction limits of the frictionless
+        impact. It stays in the friction cones, and passivity and restitution still hold.
+        ``"cancelled"``: no change of velocity without an energy gain was found, so v⁺ = v⁻, or the
+        entries of v differ by more than 2^1000 in size, so that scaling rounded the smallest.
     method, law : the method that computed the impact, and its impact law.
-    rows_used : the row budget used (None = unlimited); the same budget reproduces the result exactly.
-    tangential_impulses : (c, m) p_t [N s], |p_t| ≤ μ p at every contact that pushes, zero at the others; m = 0 without
-        friction.
-    friction_share : factor in [0, 1] that scales friction so that the impact gains no energy and, with status
-        ``"reduced"``, every contact stays in its friction cone; 1 = friction is not reduced.
+    rows_used : the row budget used (None = unlimited); the same budget reproduces the result
+        exactly.
+    tangential_impulses : (c, m) p_t [N s], |p_t| ≤ μ p at every contact that pushes, zero at the
+        others; m = 0 without friction.
+    friction_share : factor in [0, 1] that scales friction so that the impact gains no energy and,
+        with status ``"reduced"``, every contact stays in its friction cone; 1 = friction is not
+        reduced.
     """
 
     velocity: Floats
@@ -89,29 +102,40 @@ Impacts = Impact  # of many impacts
 FrictionalImpact = Impact
 
 
-def resolve_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity: ArrayLike,
-                   restitution: ArrayLike, *, method: str = "factored", budget: int | None = None,
-                   clamp: bool | None = None, rank_tolerance: float | None = None) -> Impact:
-    """Resolve a simultaneous impact: J v⁺ = −e J v⁻ for every row given, with M(v⁺ − v⁻) in range(Jᵀ).
+def resolve_impact(
+    mass_matrix: ArrayLike,
+    contact_jacobian: ArrayLike,
+    velocity: ArrayLike,
+    restitution: ArrayLike,
+    *,
+    method: str = "factored",
+    budget: int | None = None,
+    clamp: bool | None = None,
+    rank_tolerance: float | None = None,
+) -> Impact:
+    """Resolve a simultaneous impact: J v⁺ = −e J v⁻ for every row given, with M(v⁺ − v⁻) in
+    range(Jᵀ).
 
-    Every row is an equality, whatever the sign of its velocity. The caller chooses the rows that collide
-    (γ < −v_approach, paper section V).
+    Every row is an equality, whatever the sign of its velocity. The caller chooses the rows that
+    collide (γ < −v_approach, paper section V).
 
     Parameters
     ----------
     mass_matrix : (d, d) symmetric positive definite M (paper: D) [kg, kg m²].
-    contact_jacobian : (c, d) J with one row nᵀJᵢ per contact; n is a unit normal; J v > 0 separates.
-        c = 0 and zero, repeated or dependent rows are allowed.
+    contact_jacobian : (c, d) J with one row nᵀJᵢ per contact; n is a unit normal; J v > 0
+        separates. c = 0 and zero, repeated or dependent rows are allowed.
     velocity : (d,) generalized velocity v⁻ before the impact [m/s, rad/s].
-    restitution : e in [−1, 1] for all contacts; or (c,) values in [0, 1], one per contact. Unequal values use
-        Poisson's law by two LCPs (compression, then restitution; contacts only push), which is passive for
-        any such values. Equal values use the scalar rule.
-    method : ``factored`` (default), every row an equality; or ``poisson``, contacts only push, e in [0, 1]. It equals
-        Newton's LCP if every row approaches and e is one number.
-    budget : largest number of rows used, the most violated first (``factored`` only). Every budget is passive.
-    clamp : whether to scale Δv so that rounding cannot raise the energy, in real arithmetic. Default: True.
-    rank_tolerance : a row closer than this to the span of the rows used (unit rows, kinetic metric) is not used.
-        Default: 1e-10, or 4 d ε κ(L), the rounding of the rows, where this is larger.
+    restitution : e in [−1, 1] for all contacts; or (c,) values in [0, 1], one per contact. Unequal
+        values use Poisson's law by two LCPs (compression, then restitution; contacts only push),
+        which is passive for any such values. Equal values use the scalar rule.
+    method : ``factored`` (default), every row an equality; or ``poisson``, contacts only push, e in
+        [0, 1]. It equals Newton's LCP if every row approaches and e is one number.
+    budget : largest number of rows used, the most violated first (``factored`` only). Every budget
+        is passive.
+    clamp : whether to scale Δv so that rounding cannot raise the energy, in real arithmetic.
+        Default: True.
+    rank_tolerance : a row closer than this to the span of the rows used (unit rows, kinetic metric)
+        is not used. Default: 1e-10, or 4 d ε κ(L), the rounding of the rows, where this is larger.
 
     Returns
     -------
@@ -128,11 +152,12 @@ def resolve_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity
 
     Notes
     -----
-    KE⁺ = KE⁻ − ½(1 − e²) vᵀJᵀ(J M⁻¹ Jᵀ)†J v (Theorem 2, with the factor ½ that the paper omits). In floating
-    point the relative energy gain of ``factored`` stays below 10 d ε √κ(M): a refinement removes Cholesky's error
-    d ε κ(M), then the energy is clamped. With the clamp no impact gains energy, not even in the last bit: a v⁺ is
-    accepted only if a computed bound proves this for the given M (`iapb.contact.kernels.passive`).
-    Source: Constantinescu, Salcudean, Croft (2005), section V.
+    KE⁺ = KE⁻ − ½(1 − e²) vᵀJᵀ(J M⁻¹ Jᵀ)†J v (Theorem 2, with the factor ½ that the paper omits). In
+    floating point the relative energy gain of ``factored`` stays below 10 d ε √κ(M): a refinement
+    removes Cholesky's error d ε κ(M), then the energy is clamped. With the clamp no impact gains
+    energy, not even in the last bit: a v⁺ is accepted only if a computed bound proves this for the
+    given M (`iapb.contact.kernels.passive`). Source: Constantinescu, Salcudean, Croft (2005),
+    section V.
     """
     arrays = _checked(_ONE, mass_matrix, contact_jacobian, velocity)
     c = arrays[1].shape[1]
@@ -147,10 +172,18 @@ def resolve_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, velocity
     return _resolve(arrays, np.zeros(1), POISSON, options, method=method, unequal=unequal)
 
 
-def resolve_impacts(mass_matrices: ArrayLike, contact_jacobians: ArrayLike, velocities: ArrayLike,
-                    restitution: ArrayLike, *, budget: int | None = None, clamp: bool | None = None,
-                    rank_tolerance: float | None = None) -> Impact:
-    """Resolve n impacts of equal size in one call, bit for bit as `resolve_impact` with ``factored`` resolves each.
+def resolve_impacts(
+    mass_matrices: ArrayLike,
+    contact_jacobians: ArrayLike,
+    velocities: ArrayLike,
+    restitution: ArrayLike,
+    *,
+    budget: int | None = None,
+    clamp: bool | None = None,
+    rank_tolerance: float | None = None,
+) -> Impact:
+    """Resolve n impacts of equal size in one call, bit for bit as `resolve_impact` with
+    ``factored`` resolves each.
 
     Parameters
     ----------
@@ -163,14 +196,14 @@ def resolve_impacts(mass_matrices: ArrayLike, contact_jacobians: ArrayLike, velo
     Returns
     -------
     Impact
-        Velocities after the impacts (n, d), generalized impulses (n, d), impulses of the contacts (n, c), and the other
-        attributes of `Impact` for each.
+        Velocities after the impacts (n, d), generalized impulses (n, d), impulses of the contacts
+        (n, c), and the other attributes of `Impact` for each.
 
     Raises
     ------
     ArgumentError, RangeError
-        As `resolve_impact`, for the first invalid impact. The index in the argument's name begins with the number of
-        this impact: ``mass_matrices[17, 0, 0]``.
+        As `resolve_impact`, for the first invalid impact. The index in the argument's name begins
+        with the number of this impact: ``mass_matrices[17, 0, 0]``.
     """
     arrays = _checked(_MANY, mass_matrices, contact_jacobians, velocities)
     n = len(arrays[0])
@@ -178,15 +211,23 @@ def resolve_impacts(mass_matrices: ArrayLike, contact_jacobians: ArrayLike, velo
     return _resolve(arrays, e, NEWTON, _options(budget, clamp, rank_tolerance, True), many=True)
 
 
-def resolve_frictional_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLike, tangents: ArrayLike,
-                              velocity: ArrayLike, restitution: float, friction: ArrayLike) -> Impact:
+def resolve_frictional_impact(
+    mass_matrix: ArrayLike,
+    contact_jacobian: ArrayLike,
+    tangents: ArrayLike,
+    velocity: ArrayLike,
+    restitution: float,
+    friction: ArrayLike,
+) -> Impact:
     """Resolve a simultaneous impact with restitution e and Coulomb friction μ, without energy gain.
 
     Parameters
     ----------
     mass_matrix : (d, d) symmetric positive definite M.
-    contact_jacobian : (c, d) J, unit-normal rows; every row is an equality J v⁺ = −e J v⁻ (see `resolve_impact`).
-    tangents : (c, d) or (c, m, d), m = 1 (planar) or 2 (spatial): rows T of the unit tangents of each contact.
+    contact_jacobian : (c, d) J, unit-normal rows; every row is an equality J v⁺ = −e J v⁻ (see
+        `resolve_impact`).
+    tangents : (c, d) or (c, m, d), m = 1 (planar) or 2 (spatial): rows T of the unit tangents of
+        each contact.
     velocity : (d,) v⁻.
     restitution : e in [0, 1], one for all contacts.
     friction : μ ≥ 0, one or (c,).
@@ -203,10 +244,11 @@ def resolve_frictional_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLik
 
     Notes
     -----
-    Sources: Coulomb's law at velocity level is from Moreau (1988). Kane and Levinson (Dynamics, 1985) found the energy
-    gain that this method prevents. The splitting into normal and tangential part is new here. At redundant contacts the
-    normal impulses that limit friction are not unique. The method takes non-negative impulses near those of least norm,
-    or those of least norm if some contact must pull. Both depend continuously on p_t, so the limits converge
+    Sources: Coulomb's law at velocity level is from Moreau (1988). Kane and Levinson (Dynamics,
+    1985) found the energy gain that this method prevents. The splitting into normal and tangential
+    part is new here. At redundant contacts the normal impulses that limit friction are not unique.
+    The method takes non-negative impulses near those of least norm, or those of least norm if some
+    contact must pull. Both depend continuously on p_t, so the limits converge
     (`iapb.contact.kernels.impact_friction`).
     """
     if np.ndim(restitution) != 0:
@@ -214,48 +256,119 @@ def resolve_frictional_impact(mass_matrix: ArrayLike, contact_jacobian: ArrayLik
     arrays = _checked(_ONE, mass_matrix, contact_jacobian, velocity)
     c, d = arrays[1].shape[1:]
     e = _coefficients("restitution", restitution, c, "contact", 0.0)
-    mu = np.full((1, c), _coefficients("friction", friction, c, "contact", 0.0, np.finfo(float).max))
-    T = _array("tangents", tangents, 2 if np.ndim(tangents) == 2 else 3) if c or np.size(tangents) else np.zeros((0, d))
+    mu = np.full(
+        (1, c), _coefficients("friction", friction, c, "contact", 0.0, np.finfo(float).max)
+    )
+    T = (
+        _array("tangents", tangents, 2 if np.ndim(tangents) == 2 else 3)
+        if c or np.size(tangents)
+        else np.zeros((0, d))
+    )
     T = T[:, None] if T.ndim == 2 else T
     if len(T) != c or T.shape[1] not in (1, 2) or T.shape[2] != d:
-        raise ArgumentError("tangents", np.shape(tangents), f"shape ({c}, {d}) or ({c}, 1 or 2, {d})")
+        raise ArgumentError(
+            "tangents", np.shape(tangents), f"shape ({c}, {d}) or ({c}, 1 or 2, {d})"
+        )
     if not np.isfinite(T).all():
         raise ArgumentError("tangents", "a number that is not finite", "finite numbers")
     along = np.ascontiguousarray(T).reshape(1, -1, d)
-    return _resolve(arrays, e.reshape(1), COULOMB, (None, True, 0.0), tangents=along, friction=mu,
-                    directions=T.shape[1])
+    return _resolve(
+        arrays,
+        e.reshape(1),
+        COULOMB,
+        (None, True, 0.0),
+        tangents=along,
+        friction=mu,
+        directions=T.shape[1],
+    )
 
 
-def _resolve(arrays: Arrays, restitution: Floats, law: str, options: tuple[int | None, bool, float], *,
-             method: str = "factored", unequal: Floats | None = None, tangents: Floats | None = None,
-             friction: Floats | None = None, directions: int = 0, many: bool = False) -> Impact:
+def _resolve(
+    arrays: Arrays,
+    restitution: Floats,
+    law: str,
+    options: tuple[int | None, bool, float],
+    *,
+    method: str = "factored",
+    unequal: Floats | None = None,
+    tangents: Floats | None = None,
+    friction: Floats | None = None,
+    directions: int = 0,
+    many: bool = False,
+) -> Impact:
     """Resolve n impacts in one compiled call; return the first, or all if there are many."""
     (n, c, d), (budget, clamped, tolerance) = arrays[1].shape, options
-    out = Results(np.empty((n, d)), np.empty((n, d)), np.empty((n, c)), np.empty((n, c * directions)), np.empty((n, 7)))
+    out = Results(
+        np.empty((n, d)),
+        np.empty((n, d)),
+        np.empty((n, c)),
+        np.empty((n, c * directions)),
+        np.empty((n, 7)),
+    )
     limit = d if budget is None else min(budget, d)
-    done = _ENTRIES[law](*arrays, restitution, unequal, tangents, friction, tolerance, limit, clamped,
-                         _scratch(d, c, directions), out)
+    done = _ENTRIES[law](
+        *arrays,
+        restitution,
+        unequal,
+        tangents,
+        friction,
+        tolerance,
+        limit,
+        clamped,
+        _scratch(d, c, directions),
+        out,
+    )
     if done < n:
         raise diagnose(*arrays, out, done, many)
     along = out.tangential.reshape(n, c, directions)
     if many:
         rank, status, change, low, high, clamp, share = out.numbers.T
-        return Impact(*out[:3], rank.astype(np.int64), change, np.column_stack((low, high)), clamp,
-                      np.array(_STATUS)[status.astype(np.int64)], method, law, budget, along, share)
+        return Impact(
+            *out[:3],
+            rank.astype(np.int64),
+            change,
+            np.column_stack((low, high)),
+            clamp,
+            np.array(_STATUS)[status.astype(np.int64)],
+            method,
+            law,
+            budget,
+            along,
+            share,
+        )
     rank, status, change, low, high, clamp, share = out.numbers[0].tolist()
-    return Impact(out.velocity[0], out.generalized_impulse[0], out.impulses[0], int(rank), change, (low, high), clamp,
-                  _STATUS[int(status)], method, law, budget, along[0], share)
+    return Impact(
+        out.velocity[0],
+        out.generalized_impulse[0],
+        out.impulses[0],
+        int(rank),
+        change,
+        (low, high),
+        clamp,
+        _STATUS[int(status)],
+        method,
+        law,
+        budget,
+        along[0],
+        share,
+    )
 
 
 @lru_cache(maxsize=256)  # laying out a block takes longer than resolving a small impact
 def _scratch(coordinates: int, contacts: int, tangents: int) -> Any:
-    """Return scratch that all calls of this size share: a kernel holds the interpreter's lock while it runs."""
+    """Return scratch that all calls of this size share: a kernel holds the interpreter's lock while
+    it runs."""
     rows = max(1, contacts)
-    return block(zeros_of(ResolveWork, velocity=coordinates, row=rows, tangent=rows * tangents, direction=tangents))
+    return block(
+        zeros_of(
+            ResolveWork, velocity=coordinates, row=rows, tangent=rows * tangents, direction=tangents
+        )
+    )
 
 
 def diagnose(M: Floats, J: Floats, v: Floats, out: Results, refused: int, many: bool) -> IapbError:
-    """Return the error that explains why the kernel refused one of n impacts, given as arrays (n, ...).
+    """Return the error that explains why the kernel refused one of n impacts, given as arrays (n,
+    ...).
 
     It names the first wrong entry of M, v or J, else the result that is out of range.
     """
@@ -279,19 +392,26 @@ def diagnose(M: Floats, J: Floats, v: Floats, out: Results, refused: int, many: 
         return ArgumentError(named(names[0], i, j), float(M[i, j]), "a positive definite matrix")
     i, j = np.unravel_index(np.argmax(np.abs(scaled - scaled.T)), M.shape)
     if abs(scaled[i, j] - scaled[j, i]) > SYMMETRY_TOLERANCE:
-        return ArgumentError(named(names[0], i, j), float(M[i, j]),
-                             f"a symmetric matrix; entry [{j}, {i}] is {float(M[j, i])!r}")
+        return ArgumentError(
+            named(names[0], i, j),
+            float(M[i, j]),
+            f"a symmetric matrix; entry [{j}, {i}] is {float(M[j, i])!r}",
+        )
     lower = 0.5 * (scaled + scaled.T)
     if pivot := cholesky(lower, lower):
         expected = f"a positive definite matrix (pivot {pivot} of Cholesky is not positive)"
         return ArgumentError(named(names[0]), M, expected)
     if out.numbers[refused, 1] == NOT_CONVERGED:
-        return SolverError(f"Poisson's law: the active-set method did not converge on {len(J)} contacts")
+        return SolverError(
+            f"Poisson's law: the active-set method did not converge on {len(J)} contacts"
+        )
     quantities = names[2], "generalized_impulse", "impulses", "tangential_impulses"
     for quantity, values in zip(quantities, out, strict=False):
         if not np.isfinite(values[refused]).all():
             return RangeError(named(quantity), "the impact of these magnitudes is above 1.8e308")
-    return RangeError(named("energy_change"), "the kinetic energy of these magnitudes is above 1.8e308")
+    return RangeError(
+        named("energy_change"), "the kinetic energy of these magnitudes is above 1.8e308"
+    )
 
 
 def _checked(names: tuple[str, str, str], mass_matrix: Any, jacobian: Any, velocity: Any) -> Arrays:
@@ -308,12 +428,15 @@ def _checked(names: tuple[str, str, str], mass_matrix: Any, jacobian: Any, veloc
     empty = rows is not None and rows.shape == (0,)  # [] has no second dimension to check
     J = np.zeros((*lead, 0, d)) if empty else _array(names[1], jacobian, 2 + many)
     if J.shape[:many] != lead or J.shape[-1] != d:
-        raise ArgumentError(names[1], J.shape, f"shape ({', '.join(map(str, (*lead, 'contacts', d)))})")
+        raise ArgumentError(
+            names[1], J.shape, f"shape ({', '.join(map(str, (*lead, 'contacts', d)))})"
+        )
     return (M, J, v) if many else (M[None], J[None], v[None])
 
 
 def real_numbers(value: Any) -> NDArray[Any] | None:
-    """Return the value as an array; None for strings, truth values, time spans, complex numbers and masked arrays."""
+    """Return the value as an array; None for strings, truth values, time spans, complex numbers and
+    masked arrays."""
     try:
         given = np.asarray(value)
     except (TypeError, ValueError):
@@ -332,18 +455,27 @@ def real_numbers(value: Any) -> NDArray[Any] | None:
 
 def _array(name: str, value: Any, dimensions: int) -> Floats:
     """Return a contiguous array of doubles, without a check that they are finite."""
-    if type(value) is np.ndarray and value.dtype is _DOUBLE and value.ndim == dimensions and value.flags.carray:
+    if (
+        type(value) is np.ndarray
+        and value.dtype is _DOUBLE
+        and value.ndim == dimensions
+        and value.flags.carray
+    ):
         return value
     given = real_numbers(value)
     if given is None:
         raise ArgumentError(name, value, "an array of real numbers")
     array = given.astype(np.float64, copy=False)
     if array.ndim != dimensions:
-        raise ArgumentError(name, array.shape, f"an array of {dimensions} dimension{'s' * (dimensions > 1)}")
+        raise ArgumentError(
+            name, array.shape, f"an array of {dimensions} dimension{'s' * (dimensions > 1)}"
+        )
     return np.require(array, requirements=["C", "A", "W"])
 
 
-def _coefficients(name: str, value: Any, size: int, each: str, low: float, high: float = 1.0) -> Floats:
+def _coefficients(
+    name: str, value: Any, size: int, each: str, low: float, high: float = 1.0
+) -> Floats:
     """Return one number, or one for each of `size` contacts or impacts, between low and high."""
     if type(value) is float and low <= value <= high:
         return np.array(value)
@@ -352,20 +484,35 @@ def _coefficients(name: str, value: Any, size: int, each: str, low: float, high:
         raise ArgumentError(name, value, f"a real number or shape ({size},), one per {each}")
     numbers = given.astype(np.float64)
     for i in np.flatnonzero(~((numbers >= low) & (numbers <= high)))[:1]:
-        raise ArgumentError(f"{name}[{i}]" if numbers.ndim else name, float(numbers.flat[i]),
-                            f"a number in [{low:g}, 1]" if high == 1.0 else "a finite number >= 0")
+        raise ArgumentError(
+            f"{name}[{i}]" if numbers.ndim else name,
+            float(numbers.flat[i]),
+            f"a number in [{low:g}, 1]" if high == 1.0 else "a finite number >= 0",
+        )
     return numbers
 
 
-def _options(budget: Any, clamp: Any, tolerance: Any, can_stop: bool) -> tuple[int | None, bool, float]:
+def _options(
+    budget: Any, clamp: Any, tolerance: Any, can_stop: bool
+) -> tuple[int | None, bool, float]:
     """Return row budget, whether to clamp, and rank tolerance, 0 for the default."""
     if budget is not None:
         if isinstance(budget, bool) or not isinstance(budget, int | np.integer) or budget < 0:
             raise ArgumentError("budget", budget, "a whole number of rows, 0 or more")
         if not can_stop:
-            raise ArgumentError("budget", budget, "None: only 'factored', with one restitution for all, can stop early")
+            raise ArgumentError(
+                "budget",
+                budget,
+                "None: only 'factored', with one restitution for all, can stop early",
+            )
     if clamp is not None and not isinstance(clamp, bool | np.bool_):
         raise ArgumentError("clamp", clamp, "True, False or None")
-    if tolerance is not None and not (isinstance(tolerance, float | int | np.floating) and 0.0 < tolerance < 1.0):
+    if tolerance is not None and not (
+        isinstance(tolerance, float | int | np.floating) and 0.0 < tolerance < 1.0
+    ):
         raise ArgumentError("rank_tolerance", tolerance, "a number strictly between 0 and 1")
-    return None if budget is None else int(budget), clamp is None or bool(clamp), float(tolerance or 0.0)
+    return (
+        None if budget is None else int(budget),
+        clamp is None or bool(clamp),
+        float(tolerance or 0.0),
+    )

@@ -1,8 +1,10 @@
-"""Contact laws: each computes a whole step from (q, v). Engine, references and users share one protocol.
+"""Contact laws: each computes a whole step from (q, v). Engine, references and users share one
+protocol.
 
-The engine has two laws. `ImpulseAugmented`, the paper's law, applies impulses while a contact is new and penalty
-forces while it lasts. `Penalty` applies penalty forces alone: the same algorithm with e = −1 (claim C09).
-`reference.time_stepping` adds rigid constraints. Any class with `name`, `settings` and `advance` is a law.
+The engine has two laws. `ImpulseAugmented`, the paper's law, applies impulses while a contact is
+new and penalty forces while it lasts. `Penalty` applies penalty forces alone: the same algorithm
+with e = −1 (claim C09). `reference.time_stepping` adds rigid constraints. Any class with `name`,
+`settings` and `advance` is a law.
 """
 
 from __future__ import annotations
@@ -23,10 +25,18 @@ INTEGRATORS = ("momentum", "semi_implicit_euler")  # of a scene: see `iapb.conta
 RENDERINGS = ("full", "saturate", "scale", "spread")
 
 # Parts of a scene's contact section. A law's attribute `uses` names the parts that affect it.
-PENALTY, IMPULSES, FRICTION, CLUSTERS, NEWNESS = "penalty", "impulses", "friction", "clusters", "newness"
+PENALTY, IMPULSES, FRICTION, CLUSTERS, NEWNESS = (
+    "penalty",
+    "impulses",
+    "friction",
+    "clusters",
+    "newness",
+)
 IMPACT_FRICTION, OWN_RESTITUTION = "impact friction", "own restitution"
 JOINTS = "joints"  # damping and limits of joints: a law that does not name this part ignores them
-EVERYTHING = frozenset({PENALTY, IMPULSES, FRICTION, CLUSTERS, NEWNESS, IMPACT_FRICTION, OWN_RESTITUTION})
+EVERYTHING = frozenset(
+    {PENALTY, IMPULSES, FRICTION, CLUSTERS, NEWNESS, IMPACT_FRICTION, OWN_RESTITUTION}
+)
 
 
 class StepResult(NamedTuple):
@@ -44,18 +54,29 @@ def copied_step(system: Any, state: State) -> StepResult:
     """Return copies of the results of the step that `state` has just made."""
     states, tool = state.state_of_tree, system.tool_tree
     # As the kernel `contact_state` does, without numba's look-up of types.
-    told = states[tool] if tool >= 0 else next((each for each in (COLLIDING, RESTING) if each in states), FREE)
-    return StepResult(state.q.copy(), state.v.copy(), state.penalty_force.copy(), state.friction_force.copy(),
-                      state.impulse.copy(), int(told))
+    told = (
+        states[tool]
+        if tool >= 0
+        else next((each for each in (COLLIDING, RESTING) if each in states), FREE)
+    )
+    return StepResult(
+        state.q.copy(),
+        state.v.copy(),
+        state.penalty_force.copy(),
+        state.friction_force.copy(),
+        state.impulse.copy(),
+        int(told),
+    )
 
 
 class ContactLaw(Protocol):
     """A contact law: it computes the whole step.
 
-    A law may also write its contacts to ``state.contacts`` and their number to ``state.contact_count[0]``; the run
-    then records them. A law should keep no state of its own: everything that changes belongs in `state`. The optional
-    attribute `uses` names the parts of the contact section that affect the law (`iapb.advice.effects` reads it).
-    Without it, every part is assumed to affect the law.
+    A law may also write its contacts to ``state.contacts`` and their number to
+    ``state.contact_count[0]``; the run then records them. A law should keep no state of its own:
+    everything that changes belongs in `state`. The optional attribute `uses` names the parts of the
+    contact section that affect the law (`iapb.advice.effects` reads it). Without it, every part is
+    assumed to affect the law.
     """
 
     @property
@@ -69,13 +90,15 @@ class ContactLaw(Protocol):
         ...
 
     def advance(self, system: Any, state: State, applied_force: Floats, dt: float) -> StepResult:
-        """Advance (state.q, state.v) by dt [s] under a generalized force (d,) held constant over the step."""
+        """Advance (state.q, state.v) by dt [s] under a generalized force (d,) held constant over
+        the step."""
         ...
 
 
 @dataclass(frozen=True)
 class _EngineLaw:
-    """Base class of the engine's two laws: an integrator, by default the scene's, and a compiled kernel."""
+    """Base class of the engine's two laws: an integrator, by default the scene's, and a compiled
+    kernel."""
 
     integrator: str | None = None
 
@@ -87,7 +110,11 @@ class _EngineLaw:
         """Advance one step by the compiled kernel (see `ContactLaw`)."""
         world, step = system.engine_under(self)
         if dt != world.dt:
-            raise ArgumentError("dt", dt, f"the step of the scene, {world.dt!r} s; to change it, set the scene's rate")
+            raise ArgumentError(
+                "dt",
+                dt,
+                f"the step of the scene, {world.dt!r} s; to change it, set the scene's rate",
+            )
         status = step(world, state, np.ascontiguousarray(applied_force, np.float64))
         if status:
             raise IapbError(STATUS_TEXT[status])
@@ -106,20 +133,24 @@ class _EngineLaw:
 
 @dataclass(frozen=True)
 class ImpulseAugmented(_EngineLaw):
-    """The paper's law: impulses (20)-(21) when a contact is new, penalty (5) and friction (6) while it lasts.
+    """The paper's law: impulses (20)-(21) when a contact is new, penalty (5) and friction (6) while
+    it lasts.
 
     Parameters
     ----------
-    integrator : ``momentum`` or ``semi_implicit_euler`` (`iapb.contact.kernels.step`); default: the scene's.
-    rendering : how the device's force limits affect impulses (paper section VI). ``full`` ignores the limits;
-        ``saturate`` clips the force on the device; ``scale`` scales the impulse of tool and device alike; ``spread``
-        scales it and stays in collision until the rest is rendered. Without limits in the scene all four are the same.
-    friction_in_impacts : whether `contact.friction` acts in collisions too, by Coulomb's law and without energy gain
-        (`iapb.resolve_frictional_impact`). Default: the scene decides: False for `forces: paper`, which leaves it to
-        future work, and where contacts only push; else True.
-    pushing : whether contacts can only push. Every collision then uses Poisson's law by two LCPs (`method="poisson"`
-        of `iapb.resolve_impact`) instead of (21), which takes every row as an equality. Default: False, as in the
-        paper.
+    integrator : ``momentum`` or ``semi_implicit_euler`` (`iapb.contact.kernels.step`); default: the
+        scene's.
+    rendering : how the device's force limits affect impulses (paper section VI). ``full`` ignores
+        the limits; ``saturate`` clips the force on the device; ``scale`` scales the impulse of tool
+        and device alike; ``spread`` scales it and stays in collision until the rest is rendered.
+        Without limits in the scene all four are the same.
+    friction_in_impacts : whether `contact.friction` acts in collisions too, by Coulomb's law and
+        without energy gain (`iapb.resolve_frictional_impact`). Default: the scene decides: False
+        for `forces: paper`, which leaves it to future work, and where contacts only push; else
+        True.
+    pushing : whether contacts can only push. Every collision then uses Poisson's law by two LCPs
+        (`method="poisson"` of `iapb.resolve_impact`) instead of (21), which takes every row as an
+        equality. Default: False, as in the paper.
     """
 
     rendering: str = "full"
@@ -132,29 +163,43 @@ class ImpulseAugmented(_EngineLaw):
         if self.rendering not in RENDERINGS:
             raise ArgumentError("rendering", self.rendering, one_of(self.rendering, RENDERINGS))
         for name in ("friction_in_impacts", "pushing"):
-            if not isinstance(getattr(self, name), bool | None if name == "friction_in_impacts" else bool):
+            if not isinstance(
+                getattr(self, name), bool | None if name == "friction_in_impacts" else bool
+            ):
                 raise ArgumentError(name, getattr(self, name), "True or False")
         if self.friction_in_impacts and self.pushing:
-            raise ArgumentError("pushing", True, "False: friction_in_impacts needs impulses that may pull")
+            raise ArgumentError(
+                "pushing", True, "False: friction_in_impacts needs impulses that may pull"
+            )
 
     def within(self, scene: Any) -> Self:
         """Return the law with the scene's choices where it leaves them open."""
         law = super().within(scene)
         if law.friction_in_impacts is not None:
             return law
-        chosen = not law.pushing and scene.contact.forces != "paper" and scene.largest_friction > 0.0
+        chosen = (
+            not law.pushing and scene.contact.forces != "paper" and scene.largest_friction > 0.0
+        )
         return replace(law, friction_in_impacts=chosen)
 
     @property
     def name(self) -> str:
         """Name of the law; it says whether friction acts in impacts or contacts only push."""
-        extra = " with impact friction" if self.friction_in_impacts else ", contacts only push" if self.pushing else ""
+        extra = (
+            " with impact friction"
+            if self.friction_in_impacts
+            else ", contacts only push"
+            if self.pushing
+            else ""
+        )
         return f"impulse-augmented penalty{extra}"
 
     @property
     def uses(self) -> frozenset[str]:
         """Parts of the scene that the law uses."""
-        return (EVERYTHING if self.friction_in_impacts else EVERYTHING - {IMPACT_FRICTION}) | {JOINTS}
+        return (EVERYTHING if self.friction_in_impacts else EVERYTHING - {IMPACT_FRICTION}) | {
+            JOINTS
+        }
 
 
 @dataclass(frozen=True)
@@ -165,8 +210,15 @@ class Penalty(_EngineLaw):
     impulses = False
     friction_in_impacts = pushing = False
     rendering = "full"
-    uses = frozenset({PENALTY, FRICTION, CLUSTERS, NEWNESS, JOINTS})  # the record says which contacts are new
+    uses = frozenset(
+        {PENALTY, FRICTION, CLUSTERS, NEWNESS, JOINTS}
+    )  # the record says which contacts are new
 
 
-_LAWS = ImpulseAugmented(), ImpulseAugmented(friction_in_impacts=True), ImpulseAugmented(pushing=True), Penalty()
+_LAWS = (
+    ImpulseAugmented(),
+    ImpulseAugmented(friction_in_impacts=True),
+    ImpulseAugmented(pushing=True),
+    Penalty(),
+)
 ENGINE_LAWS: dict[str, ContactLaw] = {law.name: law for law in _LAWS}

@@ -1,8 +1,9 @@
-"""The haptic device: the protocol of any device, and a simulated device (paper section VI: pure inertia).
+"""The haptic device: the protocol of any device, and a simulated device (paper section VI: pure
+inertia).
 
-Coordinates are those of the hand-held tool, to which the device is kinematically equal. The compiled loop
-simulates its device in `iapb.haptics.rendering`; `SimulatedDevice` is the same device, with a constant mass matrix,
-for loops and laws written in Python.
+Coordinates are those of the hand-held tool, to which the device is kinematically equal. The
+compiled loop simulates its device in `iapb.haptics.rendering`; `SimulatedDevice` is the same
+device, with a constant mass matrix, for loops and laws written in Python.
 """
 
 from __future__ import annotations
@@ -41,7 +42,8 @@ class Device(Protocol):
 
 
 class SimulatedDevice:
-    """Inertia with damping, M ẍ = F_hand + F_actuator − b ẋ, by semi-implicit Euler, with delay, limits and sensors.
+    """Inertia with damping, M ẍ = F_hand + F_actuator − b ẋ, by semi-implicit Euler, with delay,
+    limits and sensors.
 
     Parameters
     ----------
@@ -56,10 +58,12 @@ class SimulatedDevice:
     force_limit : (d,)
         The actuators clip each component to ±limit [N, N m].
     delay : int
-        Delay [steps] of readings on their way to the simulation, and of forces on their way to the actuators.
+        Delay [steps] of readings on their way to the simulation, and of forces on their way to the
+        actuators.
     resolution : (d,)
-        Resolution of the position sensors [m, rad], 0 = exact. Above 0, the velocity reading is the difference
-        of two successive position readings over dt: it changes in steps of resolution / dt.
+        Resolution of the position sensors [m, rad], 0 = exact. Above 0, the velocity reading is the
+        difference of two successive position readings over dt: it changes in steps of resolution /
+        dt.
 
     Attributes
     ----------
@@ -69,25 +73,43 @@ class SimulatedDevice:
         Force of the hand on the device [N, N m]; it may be set at any time.
     """
 
-    def __init__(self, mass_matrix: ArrayLike, q: ArrayLike, v: ArrayLike = 0.0, *, dt: float, damping: ArrayLike = 0.0,
-                 force_limit: ArrayLike = np.inf, delay: int = 0, resolution: ArrayLike = 0.0) -> None:
+    def __init__(
+        self,
+        mass_matrix: ArrayLike,
+        q: ArrayLike,
+        v: ArrayLike = 0.0,
+        *,
+        dt: float,
+        damping: ArrayLike = 0.0,
+        force_limit: ArrayLike = np.inf,
+        delay: int = 0,
+        resolution: ArrayLike = 0.0,
+    ) -> None:
         mass = np.array(mass_matrix, np.float64)
         self._lower = np.zeros_like(mass)
         if not mass.ndim or mass.shape != mass.shape[:1] * 2 or cholesky(mass, self._lower) != 0:
-            raise ArgumentError("mass_matrix", mass_matrix, "a symmetric positive definite matrix (d, d)")
+            raise ArgumentError(
+                "mass_matrix", mass_matrix, "a symmetric positive definite matrix (d, d)"
+            )
         size = len(mass)
         self.q, self.v, self.hand_force = np.full(size, q), np.full(size, v), np.zeros(size)
-        self._damping, self._limit, self._resolution = (np.full(size, x) for x in (damping, force_limit, resolution))
+        self._damping, self._limit, self._resolution = (
+            np.full(size, x) for x in (damping, force_limit, resolution)
+        )
         self._dt = dt
-        self._readings = deque([DeviceReading(self._sensed(), self.v.copy())] * (delay + 1), delay + 1)
+        self._readings = deque(
+            [DeviceReading(self._sensed(), self.v.copy())] * (delay + 1), delay + 1
+        )
         self._forces = deque([np.zeros(size)] * delay)
 
     def read(self) -> DeviceReading:
-        """Return position and velocity as the simulation reads them: quantised and `delay` steps old."""
+        """Return position and velocity as the simulation reads them: quantised and `delay` steps
+        old."""
         return self._readings[0]
 
     def apply(self, force: ArrayLike) -> None:
-        """Advance one step under the hand and the actuators; `force` is clipped and acts `delay` steps later."""
+        """Advance one step under the hand and the actuators; `force` is clipped and acts `delay`
+        steps later."""
         commanded = finite_array("force", force, self.q.shape)
         self._forces.append(np.clip(commanded, -self._limit, self._limit))
         total = self.hand_force + self._forces.popleft() - self._damping * self.v
@@ -101,13 +123,16 @@ class SimulatedDevice:
 
     def _sensed(self) -> Floats:
         step = self._resolution
-        return np.where(step > 0.0, np.round(self.q / np.where(step > 0.0, step, 1.0)) * step, self.q)
+        return np.where(
+            step > 0.0, np.round(self.q / np.where(step > 0.0, step, 1.0)) * step, self.q
+        )
 
 
 class DeviceLink:
     """Transfers forces and readings between a device and the port of a simulation.
 
-    Delay and sensors belong to the device; the port simulates neither (`make_port` with ``external``).
+    Delay and sensors belong to the device; the port simulates neither (`make_port` with
+    ``external``).
 
     Parameters
     ----------
@@ -118,15 +143,22 @@ class DeviceLink:
 
     def __init__(self, device: Device, world: Any, state: Any, port: Any) -> None:
         if port.coupling == NO_COUPLING:
-            raise ArgumentError("device", device, "None, or a coupling: without one the hand holds the tool")
-        if not callable(getattr(device, "read", None)) or not callable(getattr(device, "apply", None)):
-            raise ArgumentError("device", device, "an object with read() and apply(force), see iapb.haptics.device")
+            raise ArgumentError(
+                "device", device, "None, or a coupling: without one the hand holds the tool"
+            )
+        if not callable(getattr(device, "read", None)) or not callable(
+            getattr(device, "apply", None)
+        ):
+            raise ArgumentError(
+                "device", device, "an object with read() and apply(force), see iapb.haptics.device"
+            )
         self.device, self._world, self._state, self._port = device, world, state, port
         self._engage = Entry(engage)
         self._read()
 
     def exchange(self) -> None:
-        """Send ``port.device_force`` to the device, read it, and update the port as `move_device` does.
+        """Send ``port.device_force`` to the device, read it, and update the port as `move_device`
+        does.
 
         A `SimulatedDevice` also gets the force of the simulated hand.
         """
@@ -140,7 +172,8 @@ class DeviceLink:
             self._engage(world, state, port)
 
     def release(self) -> None:
-        """Set the force to zero, so that a real device does not keep its last force after the simulation ends."""
+        """Set the force to zero, so that a real device does not keep its last force after the
+        simulation ends."""
         self.device.apply(np.zeros_like(self._port.device_force))
 
     def _read(self) -> None:
@@ -149,5 +182,7 @@ class DeviceLink:
             values = getattr(reading, name)
             read = np.asarray(values, np.float64)
             if read.shape != target.shape or not np.all(np.isfinite(read)):
-                raise IapbError(f"the device read {name} = {values!r}: expected {len(target)} finite numbers")
+                raise IapbError(
+                    f"the device read {name} = {values!r}: expected {len(target)} finite numbers"
+                )
             target[:] = read

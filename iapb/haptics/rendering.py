@@ -1,4 +1,5 @@
-"""Compiled kernels of the haptic side of a step: hand force, coupling, rendering, device (paper V-C and VI)."""
+"""Compiled kernels of the haptic side of a step: hand force, coupling, rendering, device (paper V-C
+and VI)."""
 
 from __future__ import annotations
 
@@ -35,7 +36,9 @@ class Port(NamedTuple):
     device_body: int  # the same in the device
     hand_point: Annotated[Floats, "3"]  # [m] held point in the body's frame
     wrench: Annotated[Floats, "6"]  # force [N] and torque [N m] of the hand, world axes
-    planned: Annotated[Floats, "planned 6"]  # the wrench of the coming steps; empty: it does not change
+    planned: Annotated[
+        Floats, "planned 6"
+    ]  # the wrench of the coming steps; empty: it does not change
     stiffness: Annotated[Floats, "tool"]  # K [N/m, N m/rad]
     damping: Annotated[Floats, "tool"]  # B [N s/m, N m s/rad]
     mechanism: MechanismArrays  # the device: kinematically the tool
@@ -48,14 +51,22 @@ class Port(NamedTuple):
     device_mass: Annotated[Floats, "tool tool"]
     device_lower: Annotated[Floats, "tool tool"]
     device_damping: Annotated[Floats, "tool"]  # physical damping b of the device
-    force_limit: Annotated[Floats, "tool"]  # [N, N m] to which the actuators clip the commanded force, inf = none
-    resolution: Annotated[Floats, "tool"]  # [m, rad] of the position sensors, in the tangent where q is no vector
+    force_limit: Annotated[
+        Floats, "tool"
+    ]  # [N, N m] to which the actuators clip the commanded force, inf = none
+    resolution: Annotated[
+        Floats, "tool"
+    ]  # [m, rad] of the position sensors, in the tangent where q is no vector
     quantised: bool
-    delayed_force: Annotated[Floats, "slot tool"]  # ring of actuator forces on their way; one slot: no delay
+    delayed_force: Annotated[
+        Floats, "slot tool"
+    ]  # ring of actuator forces on their way; one slot: no delay
     delayed_q: Annotated[Floats, "slot tool_coordinate"]  # ring of measured positions on their way
     delayed_v: Annotated[Floats, "slot tool"]
     sensed_q: Annotated[Floats, "tool_coordinate"]  # positions read by the sensors
-    measured_q: Annotated[Floats, "tool_coordinate"]  # position of the device as the simulation reads it
+    measured_q: Annotated[
+        Floats, "tool_coordinate"
+    ]  # position of the device as the simulation reads it
     measured_v: Annotated[Floats, "tool"]
     hand_force: Annotated[Floats, "velocity"]  # of the hand on the tool
     device_hand_force: Annotated[Floats, "tool"]  # of the hand on the device
@@ -74,10 +85,13 @@ class Port(NamedTuple):
 
 @kernel(needs="device")
 def measure(world, port):
-    """Write the state of the device as the simulation reads it: quantised by the sensors, and delayed."""
+    """Write the state of the device as the simulation reads it: quantised by the sensors, and
+    delayed."""
     slots = port.delayed_q.shape[0]
     now = port.clock[0] % slots
-    arriving = (port.clock[0] + 1) % slots if port.clock[0] + 1 >= slots else 0  # nothing older than the start
+    arriving = (
+        (port.clock[0] + 1) % slots if port.clock[0] + 1 >= slots else 0
+    )  # nothing older than the start
     if port.quantised:
         sense(world, port, port.delayed_v[now])
     else:
@@ -90,9 +104,11 @@ def measure(world, port):
 
 @kernel
 def sense(world, port, velocity):
-    """Write positions rounded to the sensors' resolution (0: exact), velocities from their difference over a step.
+    """Write positions rounded to the sensors' resolution (0: exact), velocities from their
+    difference over a step.
 
-    The first velocity is exact. Sensors of quaternions and of (cos, sin) count whole steps in the joint's tangent.
+    The first velocity is exact. Sensors of quaternions and of (cos, sin) count whole steps in the
+    joint's tangent.
     """
     first, m = port.clock[0] == 0, port.mechanism
     difference(m, port.sensed_q, port.device_q, port.error)
@@ -140,7 +156,9 @@ def couple(world, state, port):
     for k in range(port.applied.shape[0]):
         port.applied[k] = port.hand_force[k] + port.coupling_force[k]
     if port.coupling == UNILATERAL and port.engaged[0]:
-        for k in range(port.v_start, port.v_stop):  # the hand reaches a coupled tool through the coupler only
+        for k in range(
+            port.v_start, port.v_stop
+        ):  # the hand reaches a coupled tool through the coupler only
             port.applied[k] = port.coupling_force[k]
 
 
@@ -171,7 +189,8 @@ def coordinate(state, port):
         port.coupling_force[k] = port.stiffness[i] * port.error[i] + port.damping[i] * rate
 
 
-# Rendering and device: F_env (26), the actuator force that renders it, and the device's motion (paper V-C, VI).
+# Rendering and device: F_env (26), the actuator force that renders it, and the device's motion
+# (paper V-C, VI).
 
 
 @kernel
@@ -187,25 +206,33 @@ def render(world, state, port):
 
 @kernel(needs="device")
 def command(port):
-    """Write the actuator force: F_env (four-channel only) minus the PD, clipped to the device's limits and delayed."""
+    """Write the actuator force: F_env (four-channel only) minus the PD, clipped to the device's
+    limits and delayed."""
     slots = port.delayed_force.shape[0]
     now = port.clock[0] % slots
     for i in range(port.device_force.shape[0]):
         k = port.v_start + i
-        force = (port.environment_force[k] if port.coupling == FOUR_CHANNEL else 0.0) - port.coupling_force[k]
+        force = (
+            port.environment_force[k] if port.coupling == FOUR_CHANNEL else 0.0
+        ) - port.coupling_force[k]
         port.delayed_force[now, i] = min(max(force, -port.force_limit[i]), port.force_limit[i])
         port.device_force[i] = port.delayed_force[(port.clock[0] + 1) % slots, i]
 
 
 @kernel(needs="device", otherwise=True)
 def move_device(world, state, port):
-    """Integrate M ẍ = F_h + F_env,applied − PD − b ẋ by semi-implicit Euler; return False if the motion diverged.
+    """Integrate M ẍ = F_h + F_env,applied − PD − b ẋ by semi-implicit Euler; return False if the
+    motion diverged.
 
     A free body as device keeps its momentum, as the tool does, where the world's integrator does.
     """
     a = port.acceleration
     for i in range(a.shape[0]):
-        a[i] = port.device_hand_force[i] + port.device_force[i] - port.device_damping[i] * port.device_v[i]
+        a[i] = (
+            port.device_hand_force[i]
+            + port.device_force[i]
+            - port.device_damping[i] * port.device_v[i]
+        )
     finite = True
     if port.varying_inertia:
         forward_kinematics(port.mechanism, port.device_q, port.body)
@@ -219,7 +246,9 @@ def move_device(world, state, port):
         port.device_v[i] += world.dt * a[i]
         finite = finite and abs(port.device_v[i]) < LARGEST_SPEED
     if world.conserving and port.free.kind[0] == RIGID:
-        move_simple_trees(port.mechanism, port.free, port.trees, port.device_q, port.device_v, world.dt)
+        move_simple_trees(
+            port.mechanism, port.free, port.trees, port.device_q, port.device_v, world.dt
+        )
     else:
         integrate(port.mechanism, port.device_q, port.device_v, world.dt, port.device_q)
     port.clock[0] += 1
@@ -230,7 +259,8 @@ def move_device(world, state, port):
 
 @kernel
 def engage(world, state, port):
-    """Engage the coupler if the tool touches a body or would at the device's pose; else move the tool to the device."""
+    """Engage the coupler if the tool touches a body or would at the device's pose; else move the
+    tool to the device."""
     port.engaged[0] = state.state_of_tree[port.tool_tree] != FREE or inside(world, state, port)
     if not port.engaged[0]:
         copy_into(state.q[port.q_start : port.q_stop], port.device_q)
@@ -239,13 +269,23 @@ def engage(world, state, port):
 
 @kernel
 def inside(world, state, port):
-    """Return whether the tool would penetrate a body at the device's pose; uses the scratch of the state."""
+    """Return whether the tool would penetrate a body at the device's pose; uses the scratch of the
+    state."""
     copy_into(state.scratch_q, state.q)
     copy_into(state.scratch_q[port.q_start : port.q_stop], port.device_q)
     forward_kinematics(world.mechanism, state.scratch_q, state.body)
-    count = detect(world.shapes, world.pairs, state.body.rotation, state.body.position, 0.0, state.scratch_contacts)
+    count = detect(
+        world.shapes,
+        world.pairs,
+        state.body.rotation,
+        state.body.position,
+        0.0,
+        state.scratch_contacts,
+    )
     for i in range(max(count, 0)):
         a, b = state.scratch_contacts.body_a[i], state.scratch_contacts.body_b[i]
-        if world.tree_of_body[a] == port.tool_tree or (b >= 0 and world.tree_of_body[b] == port.tool_tree):
+        if world.tree_of_body[a] == port.tool_tree or (
+            b >= 0 and world.tree_of_body[b] == port.tool_tree
+        ):
             return True
     return False

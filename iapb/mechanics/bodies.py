@@ -1,4 +1,5 @@
-"""Rigid bodies with inertia and joint, the trees that they form, and arrays of numbers given by a caller."""
+"""Rigid bodies with inertia and joint, the trees that they form, and arrays of numbers given by a
+caller."""
 
 from __future__ import annotations
 
@@ -20,11 +21,14 @@ SYMMETRY_TOLERANCE = 1e-12
 
 
 def float_array(argument: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
-    """Return value as a contiguous float array of that shape (-1 first: any length), or raise ArgumentError."""
+    """Return value as a contiguous float array of that shape (-1 first: any length), or raise
+    ArgumentError."""
     try:
         array = np.asarray(value, np.float64, "C")
     except (TypeError, ValueError):
-        raise ArgumentError(argument, value, f"numbers of shape {shape}".replace("-1", "n")) from None
+        raise ArgumentError(
+            argument, value, f"numbers of shape {shape}".replace("-1", "n")
+        ) from None
     many = shape[:1] == (-1,) and array.ndim == len(shape) and array.shape[1:] == shape[1:]
     if array.shape != shape and not many:
         raise ArgumentError(f"{argument} of shape", array.shape, str(shape).replace("-1", "n"))
@@ -32,7 +36,8 @@ def float_array(argument: str, value: ArrayLike, shape: tuple[int, ...]) -> Floa
 
 
 def finite_array(argument: str, value: ArrayLike, shape: tuple[int, ...], unit: str = "") -> Floats:
-    """Return a copy of value as a float array of that shape with finite numbers, or raise ArgumentError."""
+    """Return a copy of value as a float array of that shape with finite numbers, or raise
+    ArgumentError."""
     array = float_array(argument, value, shape).copy()
     if not np.isfinite(array).all():
         raise ArgumentError(argument, value, f"finite numbers{f' [{unit}]' if unit else ''}")
@@ -52,7 +57,8 @@ class Body:
     joint : Joint
         How the body moves relative to its parent.
     placement : (rotation (3, 3), position (3,) [m])
-        Joint frame in the parent body's frame. At the joint's neutral position the body frame equals it.
+        Joint frame in the parent body's frame. At the joint's neutral position the body frame
+        equals it.
     mass : float
         [kg], zero allowed (a frame).
     center_of_mass : (3,) [m]
@@ -77,19 +83,27 @@ class Body:
         mass = float(finite_array(where + "mass", self.mass, (), "kg"))
         center = finite_array(where + "center_of_mass", self.center_of_mass, (3,), "m")
         inertia = finite_array(where + "inertia", self.inertia, (3, 3), "kg m^2")
-        if np.abs(rotation.T @ rotation - np.eye(3)).max() > ROTATION_TOLERANCE or np.linalg.det(rotation) < 0.0:
-            raise ArgumentError(where + "placement rotation", rotation, "a rotation matrix (orthonormal, det +1)")
+        if (
+            np.abs(rotation.T @ rotation - np.eye(3)).max() > ROTATION_TOLERANCE
+            or np.linalg.det(rotation) < 0.0
+        ):
+            raise ArgumentError(
+                where + "placement rotation", rotation, "a rotation matrix (orthonormal, det +1)"
+            )
         if np.abs(inertia - inertia.T).max() > SYMMETRY_TOLERANCE * np.abs(inertia).max():
             raise ArgumentError(where + "inertia", inertia, "a symmetric matrix [kg m^2]")
         if mass < 0.0:
             raise ArgumentError(where + "mass", mass, "at least 0 kg")
-        vars(self).update(placement=(rotation, position), mass=mass, center_of_mass=center, inertia=inertia)
+        vars(self).update(
+            placement=(rotation, position), mass=mass, center_of_mass=center, inertia=inertia
+        )
 
 
 def parents_and_trees(bodies: Sequence[Body]) -> tuple[list[int], list[int]]:
     """Return each body's parent as an index, -1 = world, and its tree, or raise ArgumentError.
 
-    Trees are numbered in the order of their roots; their bodies are consecutive, so that M is block diagonal.
+    Trees are numbered in the order of their roots; their bodies are consecutive, so that M is block
+    diagonal.
     """
     index: dict[str, int] = {}
     parents: list[int] = []
@@ -98,7 +112,9 @@ def parents_and_trees(bodies: Sequence[Body]) -> tuple[list[int], list[int]]:
         if body.name in index:
             raise ArgumentError(f"bodies[{i}].name", body.name, "a name that no other body has")
         if body.parent is not None and body.parent not in index:
-            raise ArgumentError(f"bodies[{i}].parent", body.parent, "None or the name of an earlier body")
+            raise ArgumentError(
+                f"bodies[{i}].parent", body.parent, "None or the name of an earlier body"
+            )
         last = trees[-1] if trees else -1
         parents.append(-1 if body.parent is None else index[body.parent])
         trees.append(last + 1 if body.parent is None else trees[parents[i]])

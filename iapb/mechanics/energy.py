@@ -1,15 +1,17 @@
-"""Energy balance of a run (the ledger): stored energy, work of each force, impact loss, residual of the integrator.
+"""Energy balance of a run (the ledger): stored energy, work of each force, impact loss, residual of
+the integrator.
 
-Over step k the configuration moves by the displacement Dq_k = difference(q_k, q_k+1) (q_k+1 - q_k on vector
-coordinates), that is by the velocity actually integrated. The work of a force F_k held over the step is
-F_k . Dq_k: what a force sensor and a position sensor would measure. The impulse of step k acts
-at q_k on v_k, before the forces. Then, summed over the steps so far,
+Over step k the configuration moves by the displacement Dq_k = difference(q_k, q_k+1) (q_k+1 - q_k
+on vector coordinates), that is by the velocity actually integrated. The work of a force F_k held
+over the step is F_k . Dq_k: what a force sensor and a position sensor would measure. The impulse of
+step k acts at q_k on v_k, before the forces. Then, summed over the steps so far,
 
-    kinetic + potential - initial = hand + coupling + penalty + friction work - impact_loss + residual.
+    kinetic + potential - initial = hand + coupling + penalty + friction work - impact_loss +
+    residual.
 
-The residual is energy that the time integration created (> 0) or lost (< 0); over a given time it falls with
-the step. One step of semi-implicit Euler, for example, moves by v_k+1 while the kinetic energy changes
-by F . (v_k + v_k+1) / 2 dt (constant M): it loses F . M^-1 F dt^2 / 2.
+The residual is energy that the time integration created (> 0) or lost (< 0); over a given time it
+falls with the step. One step of semi-implicit Euler, for example, moves by v_k+1 while the kinetic
+energy changes by F . (v_k + v_k+1) / 2 dt (constant M): it loses F . M^-1 F dt^2 / 2.
 """
 
 from __future__ import annotations
@@ -31,34 +33,49 @@ _impact_loss = Entry(impact_loss)
 
 
 def port_energy(force: Floats, displacement: Floats, before: float = -0.0) -> Floats:
-    """Return the energy (n,) [J] that has entered through a port by the end of each step: sum of F . Dq.
+    """Return the energy (n,) [J] that has entered through a port by the end of each step: sum of F
+    . Dq.
 
-    This is the passivity observer of Hannaford and Ryu (2002) for force (n, d) and displacement (n, d); `before` is
-    the energy [J] that entered in earlier steps.
+    This is the passivity observer of Hannaford and Ryu (2002) for force (n, d) and displacement (n,
+    d); `before` is the energy [J] that entered in earlier steps.
     """
     return _summed(np.einsum("nd,nd->n", force, displacement), before)
 
 
 def _summed(values: Floats, before: float = -0.0) -> Floats:
-    """Return the running sums, added in order: in parts or at once, with the same bits (−0.0 changes no sum)."""
+    """Return the running sums, added in order: in parts or at once, with the same bits (−0.0
+    changes no sum)."""
     return np.cumsum(np.append(before, values))[1:]
 
 
 def impact_losses(mechanism: Mechanism, q: Floats, v: Floats, impulse: Floats) -> Floats:
-    """Return the kinetic energy (n,) [J] taken by the generalized impulse (n, d) at q_k, v_k of each step.
+    """Return the kinetic energy (n,) [J] taken by the generalized impulse (n, d) at q_k, v_k of
+    each step.
 
-    The loss is -(v . P + P . M^-1 P / 2). This is exact also if the clamp or a force limit removed part of the impulse.
+    The loss is -(v . P + P . M^-1 P / 2). This is exact also if the clamp or a force limit removed
+    part of the impulse.
     """
-    losses, change, lower = np.zeros(len(impulse)), np.zeros(mechanism.nv), np.zeros((mechanism.nv, mechanism.nv))
+    losses, change, lower = (
+        np.zeros(len(impulse)),
+        np.zeros(mechanism.nv),
+        np.zeros((mechanism.nv, mechanism.nv)),
+    )
     for k in np.flatnonzero(impulse.any(axis=1)):
         mass_matrix = mechanism.mass_matrix(q[0 if mechanism.has_constant_mass_matrix else k])
         losses[k] = _impact_loss(mass_matrix, lower, v[k], impulse[k], change)
     return losses
 
 
-def energy_ledger(mechanism: Mechanism, gravity: ArrayLike, q: Floats, v: Floats, forces: Mapping[str, Floats],
-                  impulse: Floats, before: Mapping[str, float] | None = None, straight: bool = False,
-                  ) -> dict[str, Floats]:
+def energy_ledger(
+    mechanism: Mechanism,
+    gravity: ArrayLike,
+    q: Floats,
+    v: Floats,
+    forces: Mapping[str, Floats],
+    impulse: Floats,
+    before: Mapping[str, float] | None = None,
+    straight: bool = False,
+) -> dict[str, Floats]:
     """Return the energy balance of n steps.
 
     Parameters
@@ -72,8 +89,10 @@ def energy_ledger(mechanism: Mechanism, gravity: ArrayLike, q: Floats, v: Floats
     impulse : (n, d) [N s, N m s]
         Generalized impulse at the beginning of each step.
     before : ledger name -> [J], optional
-        Sums at the end of the preceding steps (see `last_of`); the sums of these n steps continue them.
-    straight : whether free bodies moved straight, by the integrator `momentum` (see `Mechanism.displacements`)
+        Sums at the end of the preceding steps (see `last_of`); the sums of these n steps continue
+        them.
+    straight : whether free bodies moved straight, by the integrator `momentum` (see
+        `Mechanism.displacements`)
 
     Returns
     -------
@@ -94,7 +113,9 @@ def energy_ledger(mechanism: Mechanism, gravity: ArrayLike, q: Floats, v: Floats
     ledger = {"kinetic": kinetic, "potential": potential}
     for name, force in forces.items():
         ledger[f"{name}_work"] = port_energy(force, displacement, before.get(f"{name}_work", -0.0))
-    ledger["impact_loss"] = _summed(impact_losses(mechanism, q, v, impulse), before.get("impact_loss", -0.0))
+    ledger["impact_loss"] = _summed(
+        impact_losses(mechanism, q, v, impulse), before.get("impact_loss", -0.0)
+    )
     total = kinetic + potential
     explained = sum((ledger[f"{name}_work"] for name in forces), -ledger["impact_loss"])
     ledger["integration_residual"] = total[1:] - before.get(_AT_FIRST, total[0]) - explained
@@ -105,28 +126,48 @@ _AT_FIRST = "energy at the start"
 
 
 def last_of(ledger: Mapping[str, Floats], before: Mapping[str, float] | None) -> dict[str, float]:
-    """Return the sums at the end of a ledger, as the argument `before` for the steps that follow."""
+    """Return the sums at the end of a ledger, as the argument `before` for the steps that
+    follow."""
     first = {_AT_FIRST: float(ledger["kinetic"][0] + ledger["potential"][0])}
-    return first | dict(before or {}) | {name: float(values[-1]) for name, values in ledger.items() if len(values)}
+    return (
+        first
+        | dict(before or {})
+        | {name: float(values[-1]) for name, values in ledger.items() if len(values)}
+    )
 
 
 def moved_straight(run: Run) -> bool:
-    """Whether the free bodies of a run moved straight in each step (see `Mechanism.displacements`)."""
+    """Whether the free bodies of a run moved straight in each step (see
+    `Mechanism.displacements`)."""
     return run.law_settings.get("integrator") == "momentum"
 
 
-def energy_of_run(run: Run, mechanism: Mechanism, gravity: ArrayLike, device: Mechanism | None = None,
-                  before: Mapping[str, float] | None = None) -> dict[str, Floats]:
-    """Return the energy balance of a run, or of its part after `before` (see `energy_ledger`), with the device.
+def energy_of_run(
+    run: Run,
+    mechanism: Mechanism,
+    gravity: ArrayLike,
+    device: Mechanism | None = None,
+    before: Mapping[str, float] | None = None,
+) -> dict[str, Floats]:
+    """Return the energy balance of a run, or of its part after `before` (see `energy_ledger`), with
+    the device.
 
-    The device adds `device_kinetic` (n + 1,), `device_hand_work` (work of the hand's force on the device: the
-    energy that has entered the system through the hand's port) and `device_actuator_work` (n,), all [J].
+    The device adds `device_kinetic` (n + 1,), `device_hand_work` (work of the hand's force on the
+    device: the energy that has entered the system through the hand's port) and
+    `device_actuator_work` (n,), all [J].
     """
     forces, before = {name: getattr(run, f"{name}_force") for name in FORCES}, before or {}
-    ledger = energy_ledger(mechanism, gravity, run.q, run.v, forces, run.impulse, before, moved_straight(run))
+    ledger = energy_ledger(
+        mechanism, gravity, run.q, run.v, forces, run.impulse, before, moved_straight(run)
+    )
     if device is not None and run.device_q.shape[1]:
         moved = device.displacements(run.device_q)
         ledger["device_kinetic"], _ = device.energies(run.device_q, run.device_v, gravity)
-        for name, force in (("hand", run.hand_force[:, slice(*run.tool_dofs)]), ("actuator", run.device_force)):
-            ledger[f"device_{name}_work"] = port_energy(force, moved, before.get(f"device_{name}_work", -0.0))
+        for name, force in (
+            ("hand", run.hand_force[:, slice(*run.tool_dofs)]),
+            ("actuator", run.device_force),
+        ):
+            ledger[f"device_{name}_work"] = port_energy(
+                force, moved, before.get(f"device_{name}_work", -0.0)
+            )
     return ledger

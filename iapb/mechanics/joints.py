@@ -1,9 +1,9 @@
 """Joint kinds: how many coordinates and velocities each has, what they mean, and their units.
 
-Layouts follow Pinocchio where the configuration is a manifold: continuous (cos, sin); quaternions x, y, z, w;
-free flyer velocities in body axes, linear part first. The engine's own `planar` joint is a chain x-prismatic,
-y-prismatic, z-revolute with v = dq/dt in the axes of the joint frame, so that a free planar body has a constant
-mass matrix.
+Layouts follow Pinocchio where the configuration is a manifold: continuous (cos, sin); quaternions
+x, y, z, w; free flyer velocities in body axes, linear part first. The engine's own `planar` joint
+is a chain x-prismatic, y-prismatic, z-revolute with v = dq/dt in the axes of the joint frame, so
+that a free planar body has a constant mass matrix.
 """
 
 from __future__ import annotations
@@ -57,7 +57,14 @@ KINDS: dict[str, JointKind] = {
         ("prismatic", PRISMATIC, "position", "m", "position", (0.0,)),
         ("planar", PLANAR, "x y theta", "m m rad", "x y theta", (0.0,) * 3),
         ("spherical", SPHERICAL, "qx qy qz qw", "1 1 1 1", "rx ry rz", (0.0, 0.0, 0.0, 1.0)),
-        ("free_flyer", FREE_FLYER, "x y z qx qy qz qw", "m m m 1 1 1 1", "x y z rx ry rz", (0.0,) * 6 + (1.0,)),
+        (
+            "free_flyer",
+            FREE_FLYER,
+            "x y z qx qy qz qw",
+            "m m m 1 1 1 1",
+            "x y z rx ry rz",
+            (0.0,) * 6 + (1.0,),
+        ),
     )
 }
 
@@ -71,8 +78,9 @@ class Joint:
     kind : str
         A name in `KINDS`.
     axis : 3-vector
-        Direction of a revolute, continuous or prismatic joint in the joint frame; any length but zero.
-        Other kinds ignore it; planar joints move in the x-y plane of the joint frame and turn about its z axis.
+        Direction of a revolute, continuous or prismatic joint in the joint frame; any length but
+        zero. Other kinds ignore it; planar joints move in the x-y plane of the joint frame and turn
+        about its z axis.
     """
 
     kind: str
@@ -92,7 +100,8 @@ class Joint:
 
     @property
     def unit_axis(self) -> NDArray[np.float64]:
-        """The axis with length one; scaled first, so that tiny axes do not vanish and huge axes do not overflow."""
+        """The axis with length one; scaled first, so that tiny axes do not vanish and huge axes do
+        not overflow."""
         axis = np.asarray(self.axis, dtype=np.float64)
         axis = axis / np.abs(axis).max()
         return axis / math.sqrt(sum(x * x for x in axis.tolist()))

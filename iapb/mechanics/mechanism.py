@@ -1,4 +1,5 @@
-"""Mechanism: bodies and joints described by one configuration q (paper section IV, equations (1) to (3)).
+"""Mechanism: bodies and joints described by one configuration q (paper section IV, equations (1) to
+(3)).
 
 M(q) dv/dt + B(q, v) + G(q) = J^T F, for several trees at once: M = blockdiag(M_1 ... M_m).
 """
@@ -28,18 +29,37 @@ from iapb.schema import Floats, Integers
 
 __all__ = ["Body", "Joint", "Mechanism"]
 
+
 @cache
 def _entries_for(kind: Any) -> SimpleNamespace:
     """Return the kernels that Python calls with mechanisms of this type of block (see `Entry`)."""
-    return SimpleNamespace(**{kernel.__name__: Entry(kernel) for kernel in (
-        configuration.difference, configuration.integrate, dynamics.gravity, dynamics.inverse_dynamics,
-        linalg.all_finite, evaluation.biases_at, evaluation.centroidal_momentum, evaluation.displacements_along,
-        evaluation.energies_along, evaluation.mass_matrices_at, evaluation.misplaced_body, evaluation.poses_along,
-        evaluation.rows_along, kinematics.forward_kinematics, kinematics.frame_jacobian)})
+    return SimpleNamespace(
+        **{
+            kernel.__name__: Entry(kernel)
+            for kernel in (
+                configuration.difference,
+                configuration.integrate,
+                dynamics.gravity,
+                dynamics.inverse_dynamics,
+                linalg.all_finite,
+                evaluation.biases_at,
+                evaluation.centroidal_momentum,
+                evaluation.displacements_along,
+                evaluation.energies_along,
+                evaluation.mass_matrices_at,
+                evaluation.misplaced_body,
+                evaluation.poses_along,
+                evaluation.rows_along,
+                kinematics.forward_kinematics,
+                kinematics.frame_jacobian,
+            )
+        }
+    )
 
 
 class _Scratch(threading.local):
-    """Scratch memory of the kernels, for all bodies and for the moving parts alone; each thread has its own."""
+    """Scratch memory of the kernels, for all bodies and for the moving parts alone; each thread has
+    its own."""
 
     def __init__(self, bodies: int, parts: int, dofs: int) -> None:
         self.workspace: Any = block(make_workspace(bodies, dofs))
@@ -63,7 +83,8 @@ class Mechanism:
     coordinate_names, coordinate_units : tuple of str (nq,)
         body.suffix of each entry of q; m, rad, or 1 for cosines, sines and quaternions.
     velocity_names, velocity_units : tuple of str (nv,)
-        body.suffix of each entry of v (and of a generalized force), with rx, ry, rz for rotations; m/s or rad/s.
+        body.suffix of each entry of v (and of a generalized force), with rx, ry, rz for rotations;
+        m/s or rad/s.
     arrays : MechanismArrays
         The bodies as contiguous arrays for the kernels.
     tree_of_body : (n,) int array
@@ -84,17 +105,27 @@ class Mechanism:
         parents, trees = parents_and_trees(self.bodies)
         self.names: tuple[str, ...] = tuple(body.name for body in self.bodies)
         layouts = [(body.name, body.joint.layout) for body in self.bodies]
-        self.coordinate_names = tuple(f"{name}.{suffix}" for name, kind in layouts for suffix in kind.coordinates)
+        self.coordinate_names = tuple(
+            f"{name}.{suffix}" for name, kind in layouts for suffix in kind.coordinates
+        )
         self.coordinate_units = tuple(unit for _, kind in layouts for unit in kind.coordinate_units)
-        self.velocity_names = tuple(f"{name}.{suffix}" for name, kind in layouts for suffix in kind.velocities)
-        self.velocity_units = tuple("rad/s" if turns else "m/s" for _, kind in layouts for turns in kind.rotating)
+        self.velocity_names = tuple(
+            f"{name}.{suffix}" for name, kind in layouts for suffix in kind.velocities
+        )
+        self.velocity_units = tuple(
+            "rad/s" if turns else "m/s" for _, kind in layouts for turns in kind.rotating
+        )
         self.nq, self.nv = len(self.coordinate_names), len(self.velocity_names)
         self.arrays: MechanismArrays = structure.collect_arrays(self.bodies, parents)
         self.block: Any = block(self.arrays)
         self._entries = _entries_for(self.block.block_type)
         self.tree_of_body: Integers = np.array(trees, np.int64)
-        starts = self.arrays.v_start[np.flatnonzero(np.diff(self.tree_of_body, prepend=-1))].tolist()
-        self.tree_dofs: list[tuple[int, int]] = list(zip(starts, [*starts[1:], self.nv], strict=False))
+        starts = self.arrays.v_start[
+            np.flatnonzero(np.diff(self.tree_of_body, prepend=-1))
+        ].tolist()
+        self.tree_dofs: list[tuple[int, int]] = list(
+            zip(starts, [*starts[1:], self.nv], strict=False)
+        )
         parts = structure.moving_parts(self.arrays)
         self._parts: Any = block(parts)
         self._scratch = _Scratch(len(self.bodies), len(parts.kind), self.nv)
@@ -120,7 +151,8 @@ class Mechanism:
         raise ArgumentError("body", body, f"a body name or an index below {len(self.bodies)}")
 
     def alone(self, tree: int) -> Mechanism:
-        """Return a mechanism of one tree alone; this is the mechanism itself if it has no other tree."""
+        """Return a mechanism of one tree alone; this is the mechanism itself if it has no other
+        tree."""
         if tree not in self._alone:
             bodies = [self.bodies[b] for b in np.flatnonzero(self.tree_of_body == tree)]
             self._alone[tree] = self if len(bodies) == len(self.bodies) else Mechanism(bodies)
@@ -131,12 +163,17 @@ class Mechanism:
         return np.array([x for b in self.bodies for x in b.joint.layout.neutral], dtype=np.float64)
 
     def integrate(self, q: ArrayLike, v: ArrayLike, dt: float = 1.0) -> Floats:
-        """Return q (nq,) moved for dt [s] with the constant velocity v: q + v dt on vector coordinates."""
-        return self._filled((self.nq,), self._entries.integrate, self._place(q), self._rates(v), float(dt))
+        """Return q (nq,) moved for dt [s] with the constant velocity v: q + v dt on vector
+        coordinates."""
+        return self._filled(
+            (self.nq,), self._entries.integrate, self._place(q), self._rates(v), float(dt)
+        )
 
     def difference(self, q0: ArrayLike, q1: ArrayLike) -> Floats:
         """Return v (d,) with integrate(q0, v, 1) = q1, by the shortest rotations."""
-        return self._filled((self.nv,), self._entries.difference, self._place(q0, "q0"), self._place(q1, "q1"))
+        return self._filled(
+            (self.nv,), self._entries.difference, self._place(q0, "q0"), self._place(q1, "q1")
+        )
 
     def placements(self, q: ArrayLike) -> tuple[Floats, Floats]:
         """Return (R (n, 3, 3), p (n, 3) [m]): axes and origin of every body in the world."""
@@ -146,8 +183,8 @@ class Mechanism:
     def poses(self, qs: ArrayLike, planar: bool) -> Floats:
         """Return the pose of every body at each of the n configurations qs (n, nq).
 
-        With `planar` the result is (n, bodies, 3): x, y [m] and the angle in (−π, π] [rad]. Otherwise it is
-        (n, bodies, 7): x, y, z [m] and the quaternion x, y, z, w with w >= 0.
+        With `planar` the result is (n, bodies, 3): x, y [m] and the angle in (−π, π] [rad].
+        Otherwise it is (n, bodies, 7): x, y, z [m] and the quaternion x, y, z, w with w >= 0.
         """
         places = float_array("qs", qs, (-1, self.nq))
         shape = len(places), len(self.bodies), 3 if planar else 7
@@ -169,10 +206,13 @@ class Mechanism:
         return out
 
     def bias(self, q: ArrayLike, v: ArrayLike) -> Floats:
-        """Return B(q, v) (d,), Coriolis and centripetal generalized forces (gravity not included)."""
+        """Return B(q, v) (d,), Coriolis and centripetal generalized forces (gravity not
+        included)."""
         place, rates = float_array("q", q, (self.nq,)), float_array("v", v, (self.nv,))
         out = np.empty((1, self.nv))
-        if not self._entries.biases_at(self._parts, self._scratch.parts, place[None], rates[None], out):
+        if not self._entries.biases_at(
+            self._parts, self._scratch.parts, place[None], rates[None], out
+        ):
             self._place(place)
             self._rates(rates)
         return out[0]
@@ -187,32 +227,54 @@ class Mechanism:
 
     def gravity(self, q: ArrayLike, g: ArrayLike) -> Floats:
         """Return G(q) (d,), the gradient of the potential energy, for the field g (3,) [m/s^2]."""
-        return self._filled((self.nv,), self._entries.gravity, self._at(q), finite_array("g", g, (3,), "m/s^2"))
+        return self._filled(
+            (self.nv,), self._entries.gravity, self._at(q), finite_array("g", g, (3,), "m/s^2")
+        )
 
     def inverse_dynamics(self, q: ArrayLike, v: ArrayLike, dv: ArrayLike, g: ArrayLike) -> Floats:
         """Return tau = M dv + B + G (d,)."""
-        given = self._at(q), self._rates(v), self._rates(dv, "dv"), finite_array("g", g, (3,), "m/s^2")
+        given = (
+            self._at(q),
+            self._rates(v),
+            self._rates(dv, "dv"),
+            finite_array("g", g, (3,), "m/s^2"),
+        )
         return self._filled((self.nv,), self._entries.inverse_dynamics, *given)
 
     def point_jacobian(self, q: ArrayLike, body: int | str, point: ArrayLike) -> Floats:
-        """Return J (3, d): velocity, in world axes, of the world point [m] regarded as fixed to the body."""
+        """Return J (3, d): velocity, in world axes, of the world point [m] regarded as fixed to the
+        body."""
         place = finite_array("point", point, (3,), "m")
-        return self._filled((6, self.nv), self._entries.frame_jacobian, self._at(q), self.index(body), place)[:3]
+        return self._filled(
+            (6, self.nv), self._entries.frame_jacobian, self._at(q), self.index(body), place
+        )[:3]
 
     def frame_jacobian(self, q: ArrayLike, body: int | str) -> Floats:
-        """Return J (6, d): velocity of the body's origin (rows 0-2) and angular velocity (rows 3-5), in world axes."""
+        """Return J (6, d): velocity of the body's origin (rows 0-2) and angular velocity (rows
+        3-5), in world axes."""
         at, b = self._at(q), self.index(body)
         return self._filled((6, self.nv), self._entries.frame_jacobian, at, b, at.position[b])
 
-    def rows_along(self, qs: ArrayLike, bodies: ArrayLike, points: ArrayLike, directions: ArrayLike) -> Floats:
-        """Return directionᵀ J (n, d) of n world points (n, 3): point i is fixed to bodies[i] at configuration qs[i].
+    def rows_along(
+        self, qs: ArrayLike, bodies: ArrayLike, points: ArrayLike, directions: ArrayLike
+    ) -> Floats:
+        """Return directionᵀ J (n, d) of n world points (n, 3): point i is fixed to bodies[i] at
+        configuration qs[i].
 
         Body -1 is the world, which does not move.
         """
-        places, fixed_to = float_array("qs", qs, (-1, self.nq)), np.ascontiguousarray(bodies, np.int64)
-        spots, along = float_array("points", points, (-1, 3)), float_array("directions", directions, (-1, 3))
+        places, fixed_to = (
+            float_array("qs", qs, (-1, self.nq)),
+            np.ascontiguousarray(bodies, np.int64),
+        )
+        spots, along = (
+            float_array("points", points, (-1, 3)),
+            float_array("directions", directions, (-1, 3)),
+        )
         if not len(places) == len(fixed_to) == len(spots) == len(along):
-            raise ArgumentError("bodies, points and directions", len(spots), f"{len(places)} each, as many as qs")
+            raise ArgumentError(
+                "bodies, points and directions", len(spots), f"{len(places)} each, as many as qs"
+            )
         if len(fixed_to) and not -1 <= fixed_to.min() <= fixed_to.max() < len(self.names):
             raise ArgumentError("bodies", fixed_to, f"numbers from -1 to {len(self.names) - 1}")
         self._check_states(places)
@@ -220,10 +282,16 @@ class Mechanism:
         return self._filled((len(places), self.nv), self._entries.rows_along, *given)
 
     def energies(self, qs: ArrayLike, vs: ArrayLike, g: ArrayLike) -> tuple[Floats, Floats]:
-        """Return kinetic and potential energy (n,) [J] at n states, qs (n, nq) and vs (n, d), for the field g (3,)."""
+        """Return kinetic and potential energy (n,) [J] at n states, qs (n, nq) and vs (n, d), for
+        the field g (3,)."""
         places, rates = self._states(qs, vs)
-        field, (kinetic, potential) = finite_array("g", g, (3,), "m/s^2"), np.zeros((2, len(places)))
-        self._entries.energies_along(self.block, self._scratch.workspace, places, rates, field, kinetic, potential)
+        field, (kinetic, potential) = (
+            finite_array("g", g, (3,), "m/s^2"),
+            np.zeros((2, len(places))),
+        )
+        self._entries.energies_along(
+            self.block, self._scratch.workspace, places, rates, field, kinetic, potential
+        )
         return kinetic, potential
 
     def kinetic_energy(self, q: ArrayLike, v: ArrayLike) -> float:
@@ -235,17 +303,19 @@ class Mechanism:
         return float(self.energies(self._place(q)[None], np.zeros((1, self.nv)), g)[1][0])
 
     def displacements(self, qs: ArrayLike, straight: bool = False) -> Floats:
-        """Return the displacement (n, d) [m, rad] of each of the n steps between the n + 1 configurations qs.
+        """Return the displacement (n, d) [m, rad] of each of the n steps between the n + 1
+        configurations qs.
 
-        A free body turns about a screw axis in a step, or, with `straight`, its centre of mass moves straight, as the
-        integrator `momentum` moves it.
+        A free body turns about a screw axis in a step, or, with `straight`, its centre of mass
+        moves straight, as the integrator `momentum` moves it.
         """
         places = float_array("qs", qs, (-1, self.nq))
         shape = max(len(places) - 1, 0), self.nv
         return self._filled(shape, self._entries.displacements_along, places, bool(straight))
 
     def centroidal_momentum(self, q: ArrayLike, v: ArrayLike) -> Floats:
-        """Return (6,): momentum [N s] and angular momentum [N m s] about the moving bodies' centre of mass."""
+        """Return (6,): momentum [N s] and angular momentum [N m s] about the moving bodies' centre
+        of mass."""
         return self._filled((6,), self._entries.centroidal_momentum, self._at(q), self._rates(v))
 
     def _at(self, q: ArrayLike) -> Any:
@@ -265,14 +335,17 @@ class Mechanism:
         return rates if self._entries.all_finite(rates) else finite_array(name, v, (self.nv,))
 
     def _place(self, q: ArrayLike, name: str = "q") -> Floats:
-        """Return a configuration (nq,) of finite numbers whose quaternions have length one, or raise ArgumentError."""
+        """Return a configuration (nq,) of finite numbers whose quaternions have length one, or
+        raise ArgumentError."""
         place = float_array(name, q, (self.nq,))
         b = self._entries.misplaced_body(self.block, place)
         if b >= 0:
             finite_array(name, q, (self.nq,))
             first, units = int(self.arrays.q_start[b]), self.bodies[b].joint.layout.coordinate_units
             of_unit = [first + i for i, unit in enumerate(units) if unit == "1"]
-            raise ArgumentError(f"{name} of body {self.names[b]!r}", place[of_unit], "entries of total length one")
+            raise ArgumentError(
+                f"{name} of body {self.names[b]!r}", place[of_unit], "entries of total length one"
+            )
         return place
 
     def _states(self, qs: ArrayLike, vs: ArrayLike) -> tuple[Floats, Floats]:

@@ -1,8 +1,10 @@
-"""Structure of a mechanism: bodies as arrays, moving parts alone, terms that vanish, constants of its free motion.
+"""Structure of a mechanism: bodies as arrays, moving parts alone, terms that vanish, constants of
+its free motion.
 
-`has_constant_mass_matrix` and `has_velocity_terms` compare with exact zeros, not with thresholds: a centre of mass
-1e-17 m off its axis keeps the terms. A term reported as absent is exactly zero. A term reported as present may still
-be zero in cases that are not checked, such as a balanced second link on a first one.
+`has_constant_mass_matrix` and `has_velocity_terms` compare with exact zeros, not with thresholds: a
+centre of mass 1e-17 m off its axis keeps the terms. A term reported as absent is exactly zero. A
+term reported as present may still be zero in cases that are not checked, such as a balanced second
+link on a first one.
 """
 
 from __future__ import annotations
@@ -24,7 +26,9 @@ from iapb.schema import Floats, Integers
 def collect_arrays(bodies: tuple[Body, ...], parents: list[int]) -> MechanismArrays:
     """Return the bodies as contiguous arrays; parents (n,) are body indices, -1 = world."""
     layouts, count = [body.joint.layout for body in bodies], len(bodies)
-    q_count, v_count = (np.array(counts, np.int64) for counts in ([k.nq for k in layouts], [k.nv for k in layouts]))
+    q_count, v_count = (
+        np.array(counts, np.int64) for counts in ([k.nq for k in layouts], [k.nv for k in layouts])
+    )
     last_dof: list[int] = []  # of each body, on the path from the world
     dof_parent: list[int] = []
     for parent, own in zip(parents, v_count.tolist(), strict=True):
@@ -52,13 +56,19 @@ def collect_arrays(bodies: tuple[Body, ...], parents: list[int]) -> MechanismArr
 
 
 def moving_parts(m: MechanismArrays) -> MechanismArrays:
-    """Return arrays of the moving bodies alone, each with the mass of the bodies fixed to it; the dofs are the same.
+    """Return arrays of the moving bodies alone, each with the mass of the bodies fixed to it; the
+    dofs are the same.
 
-    This is enough for M and B. A robot's URDF has about two links per moving link (flanges, covers, tool frames).
+    This is enough for M and B. A robot's URDF has about two links per moving link (flanges, covers,
+    tool frames).
     """
     moves = m.v_count > 0
-    carrier: list[int] = []  # the moving body that carries each body, -1: the world; it carries itself
-    placed: list[tuple[Floats, Floats]] = []  # joint frame of each body in the frame of its parent's carrier
+    carrier: list[
+        int
+    ] = []  # the moving body that carries each body, -1: the world; it carries itself
+    placed: list[
+        tuple[Floats, Floats]
+    ] = []  # joint frame of each body in the frame of its parent's carrier
     own: list[tuple[Floats, Floats]] = []  # its axes and origin in its carrier's frame
     for b, parent in enumerate(m.parent.tolist()):
         rotation, position = m.placement_rotation[b], m.placement_position[b]
@@ -70,20 +80,33 @@ def moving_parts(m: MechanismArrays) -> MechanismArrays:
         carrier.append(b if moves[b] else carrier[parent] if parent >= 0 else -1)
     moving, carriers = np.flatnonzero(moves), np.array(carrier)
     new_index = {b: i for i, b in enumerate(moving.tolist())} | {-1: -1}
-    parts = m._replace(**{name: rows[moving] for name, rows in m._asdict().items()
-                          if not name.startswith(("dof_", "quaternions"))})
+    parts = m._replace(
+        **{
+            name: rows[moving]
+            for name, rows in m._asdict().items()
+            if not name.startswith(("dof_", "quaternions"))
+        }
+    )
     parts = parts._replace(
-        parent=np.array([new_index[carrier[p] if p >= 0 else -1] for p in m.parent[moving]], np.int64),
-        dof_body=np.array([new_index[b] for b in m.dof_body.tolist()], np.int64))
+        parent=np.array(
+            [new_index[carrier[p] if p >= 0 else -1] for p in m.parent[moving]], np.int64
+        ),
+        dof_body=np.array([new_index[b] for b in m.dof_body.tolist()], np.int64),
+    )
     for i, body in enumerate(moving):
         members = np.flatnonzero(carriers == body)
         parts.mass[i] = mass = sum(m.mass[members].tolist())
         places = np.array([own[b][1] + product(own[b][0], m.center_of_mass[b]) for b in members])
         if len(members) > 1 and mass > 0.0:
             parts.center_of_mass[i] = product(places.T, m.mass[members]) / mass
-        parts.inertia[i] = sum((
-            turned_inertia(own[b][0], m.inertia[b]) + m.mass[b] * point_inertia(place - parts.center_of_mass[i])
-            for b, place in zip(members, places, strict=True)), np.zeros((3, 3)))
+        parts.inertia[i] = sum(
+            (
+                turned_inertia(own[b][0], m.inertia[b])
+                + m.mass[b] * point_inertia(place - parts.center_of_mass[i])
+                for b, place in zip(members, places, strict=True)
+            ),
+            np.zeros((3, 3)),
+        )
         parts.placement_rotation[i], parts.placement_position[i] = placed[body]
     return parts
 
@@ -100,21 +123,28 @@ def point_inertia(place: Floats) -> Floats:
 
 def has_constant_mass_matrix(parts: MechanismArrays) -> bool:
     """Return True only if M of the moving parts does not depend on q."""
-    return all(_rotation_keeps_mass_matrix(parts, b) for b in set(parts.dof_body[parts.dof_rotates].tolist()))
+    return all(
+        _rotation_keeps_mass_matrix(parts, b)
+        for b in set(parts.dof_body[parts.dof_rotates].tolist())
+    )
 
 
 def has_velocity_terms(parts: MechanismArrays, of: Container[int] | None = None) -> bool:
-    """Return False only if B(q, v) of the given moving parts, whole trees (default: all), is zero everywhere."""
-    return not all(_rotation_keeps_mass_matrix(parts, b) and _spins_without_bias(parts, b)
-                   for b in set(parts.dof_body[parts.dof_rotates].tolist()) if of is None or b in of)
+    """Return False only if B(q, v) of the given moving parts, whole trees (default: all), is zero
+    everywhere."""
+    return not all(
+        _rotation_keeps_mass_matrix(parts, b) and _spins_without_bias(parts, b)
+        for b in set(parts.dof_body[parts.dof_rotates].tolist())
+        if of is None or b in of
+    )
 
 
 def _rotation_keeps_mass_matrix(parts: MechanismArrays, b: int) -> bool:
     """Return whether M is independent of the rotation of this part's joint.
 
-    True if the part carries no other and either no part carries it or it is balanced: its centre of mass lies on
-    the axis (at the centre of a spherical joint). A free flyer has velocities in body axes, so at the root its M is the
-    inertia of the body itself.
+    True if the part carries no other and either no part carries it or it is balanced: its centre of
+    mass lies on the axis (at the centre of a spherical joint). A free flyer has velocities in body
+    axes, so at the root its M is the inertia of the body itself.
     """
     kind, carried = parts.kind[b], parts.parent[b] >= 0
     if b in parts.parent:
@@ -140,17 +170,30 @@ def _spins_without_bias(parts: MechanismArrays, b: int) -> bool:
 
 
 def make_free_motion(m: MechanismArrays, tree_of_body: Integers) -> FreeMotion:
-    """Return the constants of `iapb.mechanics.kernels.free_motion` for the trees, given as the tree of each body."""
+    """Return the constants of `iapb.mechanics.kernels.free_motion` for the trees, given as the tree
+    of each body."""
     count = 1 + int(tree_of_body.max())
-    found = FreeMotion(np.zeros(count, np.int64), np.full(count, -1, np.int64), np.zeros(count, np.int64),
-                       np.zeros((count, 3)), np.zeros((count, 3, 3)), np.ones((count, 3)), False, False)
+    found = FreeMotion(
+        np.zeros(count, np.int64),
+        np.full(count, -1, np.int64),
+        np.zeros(count, np.int64),
+        np.zeros((count, 3)),
+        np.zeros((count, 3, 3)),
+        np.ones((count, 3)),
+        False,
+        False,
+    )
     parts, carriers = moving_parts(m), np.flatnonzero(m.v_count)
     for t in range(count):
         moving = np.flatnonzero(tree_of_body[carriers] == t).tolist()
         if not moving:
             continue
         first = moving[0]
-        kind, center, inertia = int(parts.kind[first]), parts.center_of_mass[first], parts.inertia[first]
+        kind, center, inertia = (
+            int(parts.kind[first]),
+            parts.center_of_mass[first],
+            parts.inertia[first],
+        )
         found.root[t] = carriers[first]
         if len(moving) == 1 and kind in (FREE_FLYER, SPHERICAL):
             found.kind[t] = RIGID
@@ -164,12 +207,15 @@ def make_free_motion(m: MechanismArrays, tree_of_body: Integers) -> FreeMotion:
             found.kind[t] = LINKAGE
             if kind in (FREE_FLYER, PLANAR, SPHERICAL) and (parts.parent[moving[1:]] >= 0).all():
                 found.base[t] = parts.v_count[first]
-    return found._replace(turning=flag(bool((found.kind != STRAIGHT).any())),
-                          linked=flag(bool((found.kind == LINKAGE).any())))
+    return found._replace(
+        turning=flag(bool((found.kind != STRAIGHT).any())),
+        linked=flag(bool((found.kind == LINKAGE).any())),
+    )
 
 
 def principal_axes(inertia: Floats) -> tuple[Floats, Floats]:
-    """Return the principal moments, ascending, and the axes as columns of a rotation, by Jacobi's method.
+    """Return the principal moments, ascending, and the axes as columns of a rotation, by Jacobi's
+    method.
 
     Without LAPACK: the same bits on every processor.
     """

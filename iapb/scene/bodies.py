@@ -1,7 +1,8 @@
-"""Shapes, walls and moving bodies of a scene, in the plane and in space. Lengths are in metres, angles in radians.
+"""Shapes, walls and moving bodies of a scene, in the plane and in space. Lengths are in metres,
+angles in radians.
 
-In space, placements have the angles roll, pitch and yaw about the fixed x, y and z axes, in this order, as in URDF.
-Quaternions are written x, y, z, w.
+In space, placements have the angles roll, pitch and yaw about the fixed x, y and z axes, in this
+order, as in URDF. Quaternions are written x, y, z, w.
 """
 
 from __future__ import annotations
@@ -47,12 +48,16 @@ ORIGIN = (0.0, 0.0, 0.0)
 MAX_SHAPES_OF_BODY = 64
 MAX_VERTICES = 256  # use a circle for more
 UNIT_TOLERANCE = 1e-6  # error of a written quaternion's length: six digits are enough
-_STRAIGHT = 1e-9  # sine of the smallest turn at a corner; below it, rounding errors would decide convexity
+_STRAIGHT = (
+    1e-9  # sine of the smallest turn at a corner; below it, rounding errors would decide convexity
+)
 
 V = TypeVar("V")  # Vector2 or Vector3
 Center = Annotated[V, Field(description="its centre [m], in body axes (walls: world axes)")]
 Surface = Annotated[V, Field(description="a point of the surface [m], world axes")]
-Outwards = Annotated[V, Field(description="direction out of the wall, any length but zero, world axes")]
+Outwards = Annotated[
+    V, Field(description="direction out of the wall, any length but zero, world axes")
+]
 
 
 def with_direction(vector: tuple[float, ...]) -> tuple[float, ...]:
@@ -71,7 +76,9 @@ class Box(ScenePart):
     """A rectangle."""
 
     kind: Literal["box"] = Field(description="a rectangle")
-    size: tuple[Positive, Positive] = Field(description="full width and height [m], along its own axes")
+    size: tuple[Positive, Positive] = Field(
+        description="full width and height [m], along its own axes"
+    )
     center: Center[Vector2] = (0.0, 0.0)
     angle: Number = Field(0.0, description="its rotation about the centre [rad], counter-clockwise")
 
@@ -89,8 +96,11 @@ class Polygon(ScenePart):
 
     kind: Literal["polygon"] = Field(description="a convex polygon")
     vertices: Annotated[tuple[Vector2, ...], Field(min_length=3, max_length=MAX_VERTICES)] = Field(
-        description="corners in order [m], around the shape in either direction, relative to center")
-    center: Vector2 = Field((0.0, 0.0), description="where its origin lies [m], in body axes (walls: world axes)")
+        description="corners in order [m], around the shape in either direction, relative to center"
+    )
+    center: Vector2 = Field(
+        (0.0, 0.0), description="where its origin lies [m], in body axes (walls: world axes)"
+    )
     angle: Number = Field(0.0, description="its rotation about its origin [rad], counter-clockwise")
 
     @field_validator("vertices")
@@ -102,8 +112,10 @@ class Polygon(ScenePart):
         if sum(turns) < 0.0:
             vertices, turns = vertices[::-1], [-turn for turn in turns]
         once_around = abs(sum(turns) - 2.0 * math.pi) < 1.0  # the sum is a multiple of 2 pi
-        require(once_around and all(math.sin(turn) > _STRAIGHT for turn in turns),
-                "the corners of a convex polygon in order, none twice, no three on one line")
+        require(
+            once_around and all(math.sin(turn) > _STRAIGHT for turn in turns),
+            "the corners of a convex polygon in order, none twice, no three on one line",
+        )
         return vertices
 
 
@@ -111,9 +123,13 @@ class Cuboid(ScenePart):
     """A box in space."""
 
     kind: Literal["box"] = Field(description="a cuboid")
-    size: tuple[Positive, Positive, Positive] = Field(description="full side lengths [m], along its own axes")
+    size: tuple[Positive, Positive, Positive] = Field(
+        description="full side lengths [m], along its own axes"
+    )
     center: Center[Vector3] = ORIGIN
-    rpy: Vector3 = Field(ORIGIN, description="its rotation about the centre: roll, pitch, yaw [rad]")
+    rpy: Vector3 = Field(
+        ORIGIN, description="its rotation about the centre: roll, pitch, yaw [rad]"
+    )
 
 
 class Ball(ScenePart):
@@ -173,15 +189,28 @@ Wall = Annotated[HalfPlaneWall | BoxWall | CircleWall | PolygonWall, Field(discr
 SpatialShape = Annotated[Cuboid | Ball, Field(discriminator="kind")]
 SpatialWall = Annotated[HalfSpaceWall | CuboidWall | BallWall, Field(discriminator="kind")]
 
-Axis = Annotated[V | None, Field(description="direction of the joint if it has one, any length, joint frame")]
+Axis = Annotated[
+    V | None, Field(description="direction of the joint if it has one, any length, joint frame")
+]
 Origin = Annotated[V, Field(description="where the joint lies [m], parent's axes")]
 CenterOfMass = Annotated[V, Field(description="centre of mass [m], body axes")]
-Shapes = Annotated[tuple[V, ...], Field(max_length=MAX_SHAPES_OF_BODY,
-                                        description="what can touch; none: the body passes through everything")]
+Shapes = Annotated[
+    tuple[V, ...],
+    Field(
+        max_length=MAX_SHAPES_OF_BODY,
+        description="what can touch; none: the body passes through everything",
+    ),
+]
 JointDamping = Annotated[
-    tuple[NonNegative, ...], BeforeValidator(lambda given: (given,) if isinstance(given, int | float) else given,
-                                             json_schema_input_type=NonNegative | tuple[NonNegative, ...]),
-    Field(description="viscous damping of its joint [N s/m, N m s/rad], one number per velocity; default: none")]
+    tuple[NonNegative, ...],
+    BeforeValidator(
+        lambda given: (given,) if isinstance(given, int | float) else given,
+        json_schema_input_type=NonNegative | tuple[NonNegative, ...],
+    ),
+    Field(
+        description="viscous damping of its joint [N s/m, N m s/rad], one number per velocity; default: none"
+    ),
+]
 
 
 def _in_one_form(given: Any, validate: ValidatorFunctionWrapHandler) -> Any:
@@ -189,57 +218,95 @@ def _in_one_form(given: Any, validate: ValidatorFunctionWrapHandler) -> Any:
     try:
         return validate(given)
     except ValidationError:
-        raise expectation("three finite numbers xx, yy, zz; six with xy, xz, yz; or a matrix of three rows") from None
+        raise expectation(
+            "three finite numbers xx, yy, zz; six with xy, xz, yz; or a matrix of three rows"
+        ) from None
 
 
-Inertia = Annotated[Vector3 | tuple[Number, Number, Number, Number, Number, Number] | tuple[Vector3, Vector3, Vector3],
-                    WrapValidator(_in_one_form)]
+Inertia = Annotated[
+    Vector3
+    | tuple[Number, Number, Number, Number, Number, Number]
+    | tuple[Vector3, Vector3, Vector3],
+    WrapValidator(_in_one_form),
+]
 
 
 class AnyBody(ScenePart):
     """A rigid body of a tree.
 
-    The joint frame has the position `origin` and the rotation `angle` or `rpy` in the parent body's frame. The joint
-    moves the body frame relative to the joint frame. Every moving body has the mass or inertia that its joint
-    accelerates, so the mass matrix is positive definite in every configuration.
+    The joint frame has the position `origin` and the rotation `angle` or `rpy` in the parent body's
+    frame. The joint moves the body frame relative to the joint frame. Every moving body has the
+    mass or inertia that its joint accelerates, so the mass matrix is positive definite in every
+    configuration.
     """
 
     center_of_mass: Any
     mass: NonNegative = Field(0.0, description="mass [kg]")
-    density: Positive | None = Field(None, description="in place of mass, center_of_mass and inertia: mass per area of "
-                                     "the shapes [kg/m2], in space per volume [kg/m3]")
+    density: Positive | None = Field(
+        None,
+        description="in place of mass, center_of_mass and inertia: mass per area of "
+        "the shapes [kg/m2], in space per volume [kg/m3]",
+    )
     inertia: Any
     shapes: tuple[Any, ...]
-    position: tuple[Number, ...] = Field((), description="joint coordinates at the start [m, rad]; default: at rest")
-    velocity: tuple[Number, ...] = Field((), description="joint velocities at the start [m/s, rad/s]; free_flyer: "
-                                         "linear, angular, body axes; default: zeros")
+    position: tuple[Number, ...] = Field(
+        (), description="joint coordinates at the start [m, rad]; default: at rest"
+    )
+    velocity: tuple[Number, ...] = Field(
+        (),
+        description="joint velocities at the start [m/s, rad/s]; free_flyer: "
+        "linear, angular, body axes; default: zeros",
+    )
     restitution: OwnRestitution = None
     friction: OwnFriction = None
     joint_damping: JointDamping = ()
     joint_limits: tuple[Number, Number] | None = Field(
-        None, description="least and largest position of its revolute or prismatic joint [rad, m]; default: no limits")
+        None,
+        description="least and largest position of its revolute or prismatic joint [rad, m]; default: no limits",
+    )
 
     with_axis: ClassVar[tuple[str, ...]]  # joints that have an axis
 
     @model_validator(mode="before")
     @classmethod
     def _filled(cls, given: Any) -> Any:
-        """Replace a density by mass, centre of mass and inertia; one that stays is reported below."""
-        if not isinstance(given, dict) or given.get("density") is None or any(given.get(x) for x in INERTIAL):
+        """Replace a density by mass, centre of mass and inertia; one that stays is reported
+        below."""
+        if (
+            not isinstance(given, dict)
+            or given.get("density") is None
+            or any(given.get(x) for x in INERTIAL)
+        ):
             return given
-        kinds: dict[str, Any] = {"shapes": cls.model_fields["shapes"].annotation, "density": Positive}
+        kinds: dict[str, Any] = {
+            "shapes": cls.model_fields["shapes"].annotation,
+            "density": Positive,
+        }
         try:
-            inertial = _filled_with(*(TypeAdapter(kind).validate_python(given[name]) for name, kind in kinds.items()))
-        except (LookupError, ValidationError, ArithmeticError):  # no or wrong shapes, or a mass that rounds to zero
+            inertial = _filled_with(
+                *(TypeAdapter(kind).validate_python(given[name]) for name, kind in kinds.items())
+            )
+        except (
+            LookupError,
+            ValidationError,
+            ArithmeticError,
+        ):  # no or wrong shapes, or a mass that rounds to zero
             return given
-        return {name: value for name, value in given.items() if name not in ("density", *INERTIAL)} | inertial
+        return {
+            name: value for name, value in given.items() if name not in ("density", *INERTIAL)
+        } | inertial
 
     @field_validator("density")
     @classmethod
     def _replaced(cls, density: float | None) -> None:
-        require(density is None, "shapes that it fills, and no mass, center_of_mass or inertia beside it")
+        require(
+            density is None,
+            "shapes that it fills, and no mass, center_of_mass or inertia beside it",
+        )
 
-    @field_validator("axis", "mass", "position", "velocity", "joint_damping", "joint_limits", check_fields=False)
+    @field_validator(
+        "axis", "mass", "position", "velocity", "joint_damping", "joint_limits", check_fields=False
+    )
     @classmethod
     def _fits_the_joint(cls, given: Any, info: ValidationInfo) -> Any:
         """Check a field whose values depend on the kind of joint, and fill in the start."""
@@ -249,24 +316,35 @@ class AnyBody(ScenePart):
         kind = KINDS[joint]
         if field == "axis":
             require(given is None or joint in cls.with_axis, f"no axis: a {joint} joint has none")
-            require(given is not None or joint not in cls.with_axis, f"the direction of the {joint} joint")
+            require(
+                given is not None or joint not in cls.with_axis,
+                f"the direction of the {joint} joint",
+            )
             return given and with_direction(given)
         if field == "mass":
-            require(given >= SMALLEST_POSITIVE or joint not in ("prismatic", "planar", "free_flyer"),
-                    f"a mass >= {SMALLEST_POSITIVE} kg: the {joint} joint moves it")
+            require(
+                given >= SMALLEST_POSITIVE or joint not in ("prismatic", "planar", "free_flyer"),
+                f"a mass >= {SMALLEST_POSITIVE} kg: the {joint} joint moves it",
+            )
         elif field == "joint_limits" and given is not None:
             start = (info.data.get("position") or given)[0]
             require(joint in ("revolute", "prismatic"), f"no limits: a {joint} joint has none")
             require(given[0] < given[1], "two numbers, the smaller one first")
             require(given[0] <= start <= given[1], f"limits around the start, position = {start:g}")
         elif field == "position":
-            require(len(given) in (0, kind.nq), f"{counted(kind.nq)}, one per coordinate of a {joint} joint")
+            require(
+                len(given) in (0, kind.nq),
+                f"{counted(kind.nq)}, one per coordinate of a {joint} joint",
+            )
             turn = {"continuous": given, "spherical": given, "free_flyer": given[3:]}.get(joint)
             unit = not turn or abs(math.hypot(*turn) - 1.0) <= UNIT_TOLERANCE
             require(unit, "a rotation of length one: cos, sin or quaternion x, y, z, w")
             return given or kind.neutral
         elif field != "joint_limits":
-            require(len(given) in (0, kind.nv), f"{counted(kind.nv)}, one per velocity of a {joint} joint")
+            require(
+                len(given) in (0, kind.nv),
+                f"{counted(kind.nv)}, one per velocity of a {joint} joint",
+            )
             return given or (0.0,) * kind.nv * (field == "velocity")
         return given
 
@@ -274,8 +352,10 @@ class AnyBody(ScenePart):
 class _PlanarJoint(ScenePart):
     name: Name = Field(description="the body's name")
     parent: Name = Field(WORLD, description="the body it is jointed to; default: world")
-    joint: Literal["fixed", "revolute", "prismatic", "planar"] = Field(description="how it moves: fixed; revolute "
-        "[rad]; prismatic along axis [m]; planar = x, y [m], theta [rad]")
+    joint: Literal["fixed", "revolute", "prismatic", "planar"] = Field(
+        description="how it moves: fixed; revolute "
+        "[rad]; prismatic along axis [m]; planar = x, y [m], theta [rad]"
+    )
     axis: Axis[Vector2] = None
     origin: Origin[Vector2] = (0.0, 0.0)
     angle: Number = Field(0.0, description="rotation of the joint frame in the parent [rad]")
@@ -287,30 +367,43 @@ class Body(AnyBody, _PlanarJoint):
     with_axis = ("prismatic",)
 
     center_of_mass: CenterOfMass[Vector2] = (0.0, 0.0)
-    inertia: NonNegative = Field(0.0, description="moment of inertia about the centre of mass [kg m2]")
+    inertia: NonNegative = Field(
+        0.0, description="moment of inertia about the centre of mass [kg m2]"
+    )
     shapes: Shapes[Shape] = ()
 
     @field_validator("inertia")
     @classmethod
     def _turned_by_the_joint(cls, inertia: float, info: ValidationInfo) -> float:
         joint, mass, center = (info.data.get(name) for name in ("joint", "mass", "center_of_mass"))
-        require(joint != "planar" or inertia >= SMALLEST_POSITIVE,
-                f"a moment of inertia >= {SMALLEST_POSITIVE} kg m2: the planar joint turns it")
+        require(
+            joint != "planar" or inertia >= SMALLEST_POSITIVE,
+            f"a moment of inertia >= {SMALLEST_POSITIVE} kg m2: the planar joint turns it",
+        )
         if joint == "revolute" and mass is not None and center is not None:
-            require(inertia + mass * sum(c * c for c in center) >= SMALLEST_POSITIVE,
-                    "a moment of inertia > 0, or a mass whose centre is off the revolute joint's axis")
+            require(
+                inertia + mass * sum(c * c for c in center) >= SMALLEST_POSITIVE,
+                "a moment of inertia > 0, or a mass whose centre is off the revolute joint's axis",
+            )
         return inertia
 
 
 class _SpatialJoint(ScenePart):
     name: Name = Field(description="the body's name")
     parent: Name = Field(WORLD, description="the body it is jointed to; default: world")
-    joint: Literal["fixed", "revolute", "continuous", "prismatic", "spherical", "free_flyer"] = Field(description="how "
-        "it moves; position: revolute [rad], continuous cos, sin, prismatic [m], spherical quaternion x, y, z, w, "
-        "free_flyer x, y, z [m] and quaternion")
+    joint: Literal["fixed", "revolute", "continuous", "prismatic", "spherical", "free_flyer"] = (
+        Field(
+            description="how "
+            "it moves; position: revolute [rad], continuous cos, sin, prismatic [m], spherical "
+            "quaternion x, y, z, w, "
+            "free_flyer x, y, z [m] and quaternion"
+        )
+    )
     axis: Axis[Vector3] = None
     origin: Origin[Vector3] = ORIGIN
-    rpy: Vector3 = Field(ORIGIN, description="rotation of the joint frame in the parent: roll, pitch, yaw [rad]")
+    rpy: Vector3 = Field(
+        ORIGIN, description="rotation of the joint frame in the parent: roll, pitch, yaw [rad]"
+    )
 
 
 class SpatialBody(AnyBody, _SpatialJoint):
@@ -319,24 +412,35 @@ class SpatialBody(AnyBody, _SpatialJoint):
     with_axis = ("revolute", "continuous", "prismatic")
 
     center_of_mass: CenterOfMass[Vector3] = ORIGIN
-    inertia: Inertia = Field(ORIGIN, description="about the centre of mass, body axes [kg m2]: xx, yy, zz; or xx, yy, "
-        "zz, xy, xz, yz; or a matrix")
+    inertia: Inertia = Field(
+        ORIGIN,
+        description="about the centre of mass, body axes [kg m2]: xx, yy, zz; or xx, yy, "
+        "zz, xy, xz, yz; or a matrix",
+    )
     shapes: Shapes[SpatialShape] = ()
 
     @field_validator("inertia")
     @classmethod
     def _turned_by_the_joint(cls, inertia: Any, info: ValidationInfo) -> Any:
-        matrix, free = inertia_matrix(inertia), info.data.get("joint") in ("spherical", "free_flyer")
+        matrix, free = (
+            inertia_matrix(inertia),
+            info.data.get("joint") in ("spherical", "free_flyer"),
+        )
         rounding = 1e-12 * np.abs(matrix).max()
-        require(np.ndim(inertia[0]) == 0 or bool((abs(np.subtract(inertia, matrix)) <= rounding).all()),
-                "a symmetric matrix")
-        require(not free or np.linalg.eigvalsh(matrix)[0] >= SMALLEST_POSITIVE,
-                f"principal moments >= {SMALLEST_POSITIVE} kg m2: the joint turns about all axes")
+        require(
+            np.ndim(inertia[0]) == 0 or bool((abs(np.subtract(inertia, matrix)) <= rounding).all()),
+            "a symmetric matrix",
+        )
+        require(
+            not free or np.linalg.eigvalsh(matrix)[0] >= SMALLEST_POSITIVE,
+            f"principal moments >= {SMALLEST_POSITIVE} kg m2: the joint turns about all axes",
+        )
         return inertia
 
 
 def inertia_matrix(inertia: Any) -> NDArray[np.float64]:
-    """Return the inertia matrix (3, 3) given by three, six or nine numbers; of nine the symmetric part."""
+    """Return the inertia matrix (3, 3) given by three, six or nine numbers; of nine the symmetric
+    part."""
     if len(inertia) == 3 and np.ndim(inertia[0]) == 1:
         return 0.5 * np.add(inertia, np.transpose(inertia), dtype=np.float64)
     xx, yy, zz, xy, xz, yz = (*inertia, 0.0, 0.0, 0.0)[:6]
@@ -345,7 +449,8 @@ def inertia_matrix(inertia: Any) -> NDArray[np.float64]:
 
 @np.errstate(divide="raise", invalid="raise")
 def _filled_with(shapes: Sequence[Any], density: float) -> dict[str, Any]:
-    """Return `mass`, `center_of_mass` and `inertia` of shapes of one density, without BLAS; overlaps count twice."""
+    """Return `mass`, `center_of_mass` and `inertia` of shapes of one density, without BLAS;
+    overlaps count twice."""
     parts = [_mass_of(shape, density) for shape in shapes]
     mass = math.fsum(m for m, _, _ in parts)
     center = sum(m * c for m, c, _ in parts) / mass
@@ -353,12 +458,19 @@ def _filled_with(shapes: Sequence[Any], density: float) -> dict[str, Any]:
     for m, c, about in parts:
         r = c - center
         square = (r * r).sum()
-        inertia = inertia + about + m * (square if len(r) == 2 else square * np.eye(3) - np.outer(r, r))
-    return {"mass": mass, "center_of_mass": center.tolist(), "inertia": np.asarray(inertia).tolist()}
+        inertia = (
+            inertia + about + m * (square if len(r) == 2 else square * np.eye(3) - np.outer(r, r))
+        )
+    return {
+        "mass": mass,
+        "center_of_mass": center.tolist(),
+        "inertia": np.asarray(inertia).tolist(),
+    }
 
 
 def _mass_of(shape: Any, density: float) -> tuple[float, Any, Any]:
-    """Return mass, centre of mass in body axes, and inertia about it: a number in the plane, a matrix in space."""
+    """Return mass, centre of mass in body axes, and inertia about it: a number in the plane, a
+    matrix in space."""
     center = np.array(shape.center)
     if shape.kind == "circle":
         mass = density * math.pi * shape.radius**2
@@ -380,10 +492,13 @@ def _mass_of(shape: Any, density: float) -> tuple[float, Any, Any]:
 
 
 def _polygon(vertices: Any, density: float) -> tuple[float, Any, float]:
-    """Return mass, centre and moment of inertia from the triangles between the first corner and each edge."""
+    """Return mass, centre and moment of inertia from the triangles between the first corner and
+    each edge."""
     a, b = vertices[1:-1] - vertices[0], vertices[2:] - vertices[0]
     masses = 0.5 * density * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
     mass = masses.sum()
     center = (masses[:, None] * (a + b)).sum(axis=0) / (3.0 * mass)
-    about = (masses * (a * a + a * b + b * b).sum(axis=1)).sum() / 6.0 - mass * (center * center).sum()
+    about = (masses * (a * a + a * b + b * b).sum(axis=1)).sum() / 6.0 - mass * (
+        center * center
+    ).sum()
     return float(mass), center + vertices[0], about

@@ -1,7 +1,9 @@
-"""Convert YAML text to plain values with line and column, and back. Tags are refused; size and depth are bounded.
+"""Convert YAML text to plain values with line and column, and back. Tags are refused; size and
+depth are bounded.
 
-ruamel composes the text into nodes, which know their places; it never constructs values. So there are only numbers,
-texts, truth values, lists and mappings. Scalars follow YAML 1.2 (``1e-3`` is a number, ``yes`` is a text).
+ruamel composes the text into nodes, which know their places; it never constructs values. So there
+are only numbers, texts, truth values, lists and mappings. Scalars follow YAML 1.2 (``1e-3`` is a
+number, ``yes`` is a text).
 """
 
 from __future__ import annotations
@@ -17,7 +19,9 @@ from iapb.scene.parts import Path, written
 
 MAX_CHARACTERS = 1_000_000
 MAX_DEPTH = 24  # the deepest valid value, a vertex of a body's shape, has depth 7
-MAX_NODES = 100_000  # values and field names after expansion of aliases, which could make a small file huge
+MAX_NODES = (
+    100_000  # values and field names after expansion of aliases, which could make a small file huge
+)
 _INTEGER = re.compile(r"[-+]?[0-9]{1,18}")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _WORDS: dict[str, Any] = {
@@ -52,7 +56,9 @@ class Document:
         self.mistakes: list[Mistake] = []
         self._keys: dict[Path, tuple[int, int]] = {}
         if len(text) > MAX_CHARACTERS:
-            raise self._refusal((1, 1), f"{len(text)} characters", f"a file of at most {MAX_CHARACTERS} characters")
+            raise self._refusal(
+                (1, 1), f"{len(text)} characters", f"a file of at most {MAX_CHARACTERS} characters"
+            )
         yaml = YAML(typ="safe", pure=True)
         yaml.composer.warn_double_anchors = False
         try:
@@ -75,7 +81,9 @@ class Document:
         if self._count > MAX_NODES:
             raise self._refusal(place, f"more than {MAX_NODES} values", "a smaller scene")
         if node.ctag.handle is not None:
-            raise self._refusal(place, str(node.ctag), "no tags: a scene is plain numbers, texts and lists")
+            raise self._refusal(
+                place, str(node.ctag), "no tags: a scene is plain numbers, texts and lists"
+            )
         if len(path) > MAX_DEPTH:
             raise self._refusal(place, "(nested too deeply)", f"at most {MAX_DEPTH} levels")
         if node.id == "scalar":
@@ -93,11 +101,14 @@ class Document:
             if key.value not in found:
                 found[key.value] = value
             else:
-                self.mistakes.append(Mistake(self.file, *_place(key), written(here), "(repeated)", "each field once"))
+                self.mistakes.append(
+                    Mistake(self.file, *_place(key), written(here), "(repeated)", "each field once")
+                )
         return found
 
     def place(self, path: Path, key: bool = False) -> tuple[int, int]:
-        """Return line and column, from 1, of a value or of its key; if it is absent, of the nearest value around it."""
+        """Return line and column, from 1, of a value or of its key; if it is absent, of the nearest
+        value around it."""
         if key and path in self._keys:
             return self._keys[path]
         while path not in self._places:
@@ -110,7 +121,8 @@ def _place(node: Any) -> tuple[int, int]:
 
 
 def scalar(text: str) -> Any:
-    """Return the value of an unquoted YAML 1.2 scalar: None, a truth value, a number or the text itself."""
+    """Return the value of an unquoted YAML 1.2 scalar: None, a truth value, a number or the text
+    itself."""
     if text in _WORDS:
         return _WORDS[text]
     if _INTEGER.fullmatch(text):
@@ -119,7 +131,8 @@ def scalar(text: str) -> Any:
 
 
 def yaml_text(fields: dict[str, Any]) -> str:
-    """Return the fields of a scene as YAML; a list or mapping without nested ones is written on one line."""
+    """Return the fields of a scene as YAML; a list or mapping without nested ones is written on one
+    line."""
     return "".join(_field_text(repr({name: value, "": [[]]})) for name, value in fields.items())
 
 
@@ -132,11 +145,19 @@ def _field_text(field: str) -> str:
             return True
 
         def represent_str(self, text: str) -> Any:  # in quotes if `scalar` would read a number
-            return self.represent_scalar("tag:yaml.org,2002:str", text, None if scalar(text) == text else '"')
+            return self.represent_scalar(
+                "tag:yaml.org,2002:str", text, None if scalar(text) == text else '"'
+            )
 
     Plain.add_representer(str, Plain.represent_str)
     text, yaml = StringIO(), YAML(typ="safe", pure=True)  # type: tuple[StringIO, Any]
     yaml.Representer = Plain
-    yaml.default_flow_style, yaml.width, yaml.sort_base_mapping_type_on_output = None, 1_000_000, False
-    yaml.dump(literal_eval(field), text)  # with a nested list, or a single field would be written in braces
+    yaml.default_flow_style, yaml.width, yaml.sort_base_mapping_type_on_output = (
+        None,
+        1_000_000,
+        False,
+    )
+    yaml.dump(
+        literal_eval(field), text
+    )  # with a nested list, or a single field would be written in braces
     return text.getvalue().rpartition('"":')[0]

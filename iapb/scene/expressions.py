@@ -1,7 +1,8 @@
-"""Functions of time in a scene file: arithmetic with t, pi and a few functions, read without running Python code.
+"""Functions of time in a scene file: arithmetic with t, pi and a few functions, read without
+running Python code.
 
-Their values have the same bits on every processor, because libm is not used: `iapb.elementary` gives sines, decimal
-arithmetic the exponential, and multiplication powers.
+Their values have the same bits on every processor, because libm is not used: `iapb.elementary`
+gives sines, decimal arithmetic the exponential, and multiplication powers.
 """
 
 from __future__ import annotations
@@ -42,20 +43,33 @@ def _power(base: float, exponent: float) -> float:
 
 
 FUNCTIONS: dict[str, tuple[Callable[..., float], int]] = {  # with the least number of arguments
-    "sin": (lambda x: _sine_cosine(x)[0], 1), "cos": (lambda x: _sine_cosine(x)[1], 1), "exp": (_exp, 1),
-    "sqrt": (math.sqrt, 1), "abs": (abs, 1), "step": (lambda x: 1.0 if x >= 0.0 else 0.0, 1),
-    "min": (min, 2), "max": (max, 2),
+    "sin": (lambda x: _sine_cosine(x)[0], 1),
+    "cos": (lambda x: _sine_cosine(x)[1], 1),
+    "exp": (_exp, 1),
+    "sqrt": (math.sqrt, 1),
+    "abs": (abs, 1),
+    "step": (lambda x: 1.0 if x >= 0.0 else 0.0, 1),
+    "min": (min, 2),
+    "max": (max, 2),
 }
 _OPERATORS: dict[type, Callable[..., float]] = {
-    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv, ast.Pow: _power,
-    ast.UAdd: operator.pos, ast.USub: operator.neg,
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: _power,
+    ast.UAdd: operator.pos,
+    ast.USub: operator.neg,
 }
-_KNOWN = f"numbers, t, pi, + - * / **, and {', '.join(FUNCTIONS)} (step(x) is 1 where x >= 0, else 0)"
+_KNOWN = (
+    f"numbers, t, pi, + - * / **, and {', '.join(FUNCTIONS)} (step(x) is 1 where x >= 0, else 0)"
+)
 
 
 @cache
 def function_of(text: str) -> Function:
-    """Return the function of t that a checked text describes; it raises IapbError if its value is not finite."""
+    """Return the function of t that a checked text describes; it raises IapbError if its value is
+    not finite."""
     inner = _made(ast.parse(text, mode="eval").body)
 
     def function(t: float) -> float:
@@ -71,7 +85,8 @@ def function_of(text: str) -> Function:
 
 
 def _made(node: ast.expr) -> Function:
-    """Turn one node into a function of t; raise SyntaxError for a node that an expression may not contain."""
+    """Turn one node into a function of t; raise SyntaxError for a node that an expression may not
+    contain."""
     called: Callable[..., float] | None = None
     match node:
         case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
@@ -102,14 +117,20 @@ def _checked(text: str) -> str:
     except IapbError as error:
         raise expectation(f"a finite number at t = 0: {error}") from error
     except (SyntaxError, ValueError, RecursionError, MemoryError, OverflowError) as error:
-        said = error.msg if isinstance(error, SyntaxError) and error.lineno is None else f"an expression of {_KNOWN}"
+        said = (
+            error.msg
+            if isinstance(error, SyntaxError) and error.lineno is None
+            else f"an expression of {_KNOWN}"
+        )
         raise expectation(said) from error
     return text
 
 
 Expression = Annotated[
     Text,
-    BeforeValidator(lambda given: repr(given) if type(given) in (int, float) else given,
-                    json_schema_input_type=float | Text),
+    BeforeValidator(
+        lambda given: repr(given) if type(given) in (int, float) else given,
+        json_schema_input_type=float | Text,
+    ),
     AfterValidator(_checked),
 ]

@@ -1,7 +1,8 @@
-"""Turn a scene into the engine's mechanism, shapes and candidate pairs, with restitution and friction of each pair.
+"""Turn a scene into the engine's mechanism, shapes and candidate pairs, with restitution and
+friction of each pair.
 
-The bodies of a planar scene lie in the plane z = 0 of the spatial engine. BLAS is not used here, because its last bits
-depend on the processor.
+The bodies of a planar scene lie in the plane z = 0 of the spatial engine. BLAS is not used here,
+because its last bits depend on the processor.
 """
 
 from __future__ import annotations
@@ -29,10 +30,12 @@ UNSTATED = 2.0  # larger than any restitution, so that the minimum of two is a g
 
 
 def mechanism_of(scene: Scene) -> Mechanism:
-    """Return the scene's bodies as a mechanism, in the scene's order; q concatenates their positions.
+    """Return the scene's bodies as a mechanism, in the scene's order; q concatenates their
+    positions.
 
-    A planar moment of inertia I about z becomes diag(I/2, I/2, I), the inertia of a flat body, so that the spatial
-    engine gets a physical inertia. Motion in the plane depends on its zz entry alone.
+    A planar moment of inertia I about z becomes diag(I/2, I/2, I), the inertia of a flat body, so
+    that the spatial engine gets a physical inertia. Motion in the plane depends on its zz entry
+    alone.
     """
     return Mechanism(map(_body_in_space, scene.bodies))
 
@@ -55,7 +58,11 @@ def _body_in_space(body: Any) -> Body:
 
 def _turn(placed: Any) -> Floats:
     """Return the rotation matrix of a placement: (3, 3) in space, (2, 2) in the plane."""
-    return rotation_of(placed.rpy) if hasattr(placed, "rpy") else rotation_of((0.0, 0.0, placed.angle))[:2, :2]
+    return (
+        rotation_of(placed.rpy)
+        if hasattr(placed, "rpy")
+        else rotation_of((0.0, 0.0, placed.angle))[:2, :2]
+    )
 
 
 def start_of(scene: Scene) -> tuple[Floats, Floats]:
@@ -66,7 +73,8 @@ def start_of(scene: Scene) -> tuple[Floats, Floats]:
 
 
 def wrench_of(scene: Scene, time: float) -> Floats:
-    """Return force and torque (6,) of the scene's hand at a time [s] in world axes; zeros without a hand."""
+    """Return force and torque (6,) of the scene's hand at a time [s] in world axes; zeros without a
+    hand."""
     wrench, force = np.zeros(6), scene.hand.force_at(time) if scene.hand is not None else [0.0] * 6
     wrench[[0, 1, 5] if len(force) == 3 else slice(None)] = force
     return wrench
@@ -93,7 +101,8 @@ def _owned_shapes(scene: Scene) -> list[tuple[int, Any, Any]]:
 def shapes_of(scene: Scene) -> Shapes:
     """Return the scene's shapes: those of the bodies in order, then the walls.
 
-    A shape of a body that cannot move (all joints between it and the world are fixed) is static, like a wall.
+    A shape of a body that cannot move (all joints between it and the world are fixed) is static,
+    like a wall.
     """
     space = isinstance(scene, SpatialScene)
     n, parents, made = 3 if space else 2, _parents(scene), []
@@ -101,9 +110,16 @@ def shapes_of(scene: Scene) -> Shapes:
         rotation, shift, link = np.eye(n), np.zeros(n), body
         while link >= 0 and scene.bodies[link].joint == "fixed":
             turn = _turn(scene.bodies[link])
-            rotation, shift = product(turn, rotation), product(turn, shift) + scene.bodies[link].origin
+            rotation, shift = (
+                product(turn, rotation),
+                product(turn, shift) + scene.bodies[link].origin,
+            )
             link = parents[link]
-        made.append(_placed(shape, -1, rotation, shift) if link < 0 else _placed(shape, body, np.eye(n), np.zeros(n)))
+        made.append(
+            _placed(shape, -1, rotation, shift)
+            if link < 0
+            else _placed(shape, body, np.eye(n), np.zeros(n))
+        )
     return make_shapes(made, space)
 
 
@@ -113,7 +129,9 @@ def _placed(shape: Any, body: int, rotation: Floats, shift: Floats) -> geometry.
         normal = np.array(shape.normal) / math.hypot(*shape.normal)
         return geometry.Shape(geometry.HALF_PLANE, vertices=[shape.point, normal])
     if shape.kind == "half_space":
-        return geometry.Shape(geometry.HALF_SPACE, center=shape.point, axes=frame_along(np.array(shape.normal)))
+        return geometry.Shape(
+            geometry.HALF_SPACE, center=shape.point, axes=frame_along(np.array(shape.normal))
+        )
     center = product(rotation, shape.center) + shift
     if shape.kind == "circle":
         return geometry.Shape(geometry.CIRCLE, body, shape.radius, [center], [*center, 0.0])
@@ -121,17 +139,23 @@ def _placed(shape: Any, body: int, rotation: Floats, shift: Floats) -> geometry.
         return geometry.Shape(geometry.SPHERE, body, shape.radius, center=center)
     turn = product(rotation, _turn(shape))
     if len(turn) == 3:
-        return geometry.Shape(geometry.BOX, body, center=center, axes=turn, half_size=0.5 * np.array(shape.size))
-    corners = shape.vertices if shape.kind == "polygon" else 0.5 * np.array(
-        [[-1, -1], [1, -1], [1, 1], [-1, 1]]) * shape.size
+        return geometry.Shape(
+            geometry.BOX, body, center=center, axes=turn, half_size=0.5 * np.array(shape.size)
+        )
+    corners = (
+        shape.vertices
+        if shape.kind == "polygon"
+        else 0.5 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * shape.size
+    )
     return geometry.Shape(geometry.POLYGON, body, vertices=product(corners, turn.T) + center)
 
 
 def pairs_of(scene: Scene, shapes: Shapes) -> Pairs:
-    """Return the candidate pairs (k, 2) of the scene's shapes (`shapes_of`); the first shape is of a moving body.
+    """Return the candidate pairs (k, 2) of the scene's shapes (`shapes_of`); the first shape is of
+    a moving body.
 
-    Bodies of one tree are paired only with ``contact.self_collisions``. Rigidly connected bodies and neighbours across
-    one joint are never paired, because they touch by construction.
+    Bodies of one tree are paired only with ``contact.self_collisions``. Rigidly connected bodies
+    and neighbours across one joint are never paired, because they touch by construction.
     """
     tree: list[int] = []  # body -> first body of its tree
     part: list[int] = []  # body -> first body of its rigid part
@@ -143,33 +167,56 @@ def pairs_of(scene: Scene, shapes: Shapes) -> Pairs:
         carrier.append(carrier[parent] if welded else part[parent] if parent >= 0 else -1)
     pairs = candidate_pairs(shapes)
     bodies = np.array([body for body, _, _ in _owned_shapes(scene)], np.int64)[pairs.T]
-    (tree_a, tree_b), (part_a, part_b), (carrier_a, carrier_b) = np.array([tree, part, carrier])[:, bodies]
+    (tree_a, tree_b), (part_a, part_b), (carrier_a, carrier_b) = np.array([tree, part, carrier])[
+        :, bodies
+    ]
     adjoining = (part_a == part_b) | (carrier_a == part_b) | (carrier_b == part_a)
     apart = (bodies < 0).any(axis=0) | (tree_a != tree_b)
     return pairs[apart | (scene.contact.self_collisions & ~adjoining)]
 
 
 def stops_of(scene: Scene, mechanism: Mechanism) -> Stops:
-    """Return the limits of the joints as contacts of a joint's body and its parent, two for each joint with limits.
+    """Return the limits of the joints as contacts of a joint's body and its parent, two for each
+    joint with limits.
 
-    The gap is arm · sign · (position − bound) [m]: the distance to the bound of a point on that arm; 1 m for a
-    prismatic joint. The arm of a revolute joint is the radius of gyration, about its axis, of all bodies that it
-    carries, in the pose of the start. The effective mass at the stop is then their whole mass, and stiffness and
-    damping act as at a contact.
+    The gap is arm · sign · (position − bound) [m]: the distance to the bound of a point on that
+    arm; 1 m for a prismatic joint. The arm of a revolute joint is the radius of gyration, about its
+    axis, of all bodies that it carries, in the pose of the start. The effective mass at the stop is
+    then their whole mass, and stiffness and damping act as at a contact.
     """
-    parents, carried, arrays = _parents(scene), [body.mass for body in scene.bodies], mechanism.arrays
+    parents, carried, arrays = (
+        _parents(scene),
+        [body.mass for body in scene.bodies],
+        mechanism.arrays,
+    )
     for i, parent in reversed(list(enumerate(parents))):
         if parent >= 0:
             carried[parent] += carried[i]
     limited = [i for i, body in enumerate(scene.bodies) if body.joint_limits is not None]
     inertia = np.diagonal(mechanism.mass_matrix(start_of(scene)[0])) if limited else np.zeros(0)
-    turned = [float(inertia[arrays.v_start[i]]) if scene.bodies[i].joint == "revolute" else 0.0 for i in limited]
-    arms = [math.sqrt(x / carried[i]) if x > 0.0 and carried[i] > 0.0 else 1.0
-            for i, x in zip(limited, turned, strict=True)]
-    body, bounds = np.repeat(np.array(limited, np.int64), 2), [scene.bodies[i].joint_limits or () for i in limited]
+    turned = [
+        float(inertia[arrays.v_start[i]]) if scene.bodies[i].joint == "revolute" else 0.0
+        for i in limited
+    ]
+    arms = [
+        math.sqrt(x / carried[i]) if x > 0.0 and carried[i] > 0.0 else 1.0
+        for i, x in zip(limited, turned, strict=True)
+    ]
+    body, bounds = (
+        np.repeat(np.array(limited, np.int64), 2),
+        [scene.bodies[i].joint_limits or () for i in limited],
+    )
     shape = len(_owned_shapes(scene)) + np.arange(len(body), dtype=np.int64)
-    return Stops(body, np.array(parents, np.int64)[body], shape, arrays.q_start[body], arrays.v_start[body],
-                 np.tile([1.0, -1.0], len(limited)), np.array(bounds, np.float64).ravel(), np.repeat(arms, 2))
+    return Stops(
+        body,
+        np.array(parents, np.int64)[body],
+        shape,
+        arrays.q_start[body],
+        arrays.v_start[body],
+        np.tile([1.0, -1.0], len(limited)),
+        np.array(bounds, np.float64).ravel(),
+        np.repeat(arms, 2),
+    )
 
 
 def _stop_count(scene: Scene) -> int:
@@ -177,33 +224,39 @@ def _stop_count(scene: Scene) -> int:
 
 
 def restitution_by_shape(scene: Scene) -> Floats:
-    """Return the restitution (n,) that the body or wall of each shape gives; UNSTATED if it gives none.
+    """Return the restitution (n,) that the body or wall of each shape gives; UNSTATED if it gives
+    none.
 
-    The shapes have the order of `shapes_of`. The stops of the joints follow; they give no restitution.
+    The shapes have the order of `shapes_of`. The stops of the joints follow; they give no
+    restitution.
     """
-    given = [owner.restitution for _, owner, _ in _owned_shapes(scene)] + [None] * _stop_count(scene)
+    given = [owner.restitution for _, owner, _ in _owned_shapes(scene)] + [None] * _stop_count(
+        scene
+    )
     return np.array([UNSTATED if e is None else e for e in given], np.float64)
 
 
 def restitution_by_pair(scene: Scene, pairs: Pairs) -> Floats:
     """Return e of each candidate pair (k, 2) of shapes.
 
-    The smaller of the two given values counts. If only one of the two gives a value, that value counts; if neither
-    does, `contact.restitution` counts. So equal values are kept to the last bit, and a soft body is soft against
-    everything.
+    The smaller of the two given values counts. If only one of the two gives a value, that value
+    counts; if neither does, `contact.restitution` counts. So equal values are kept to the last bit,
+    and a soft body is soft against everything.
     """
     smaller = restitution_by_shape(scene)[pairs].min(axis=1)
     return np.where(smaller > 1.0, scene.contact.restitution, smaller)
 
 
 def restitutions_of(scene: Scene, pairs: Pairs) -> Floats:
-    """Return the distinct values of e among the candidate pairs (k, 2) of shapes and the joints' stops, ascending."""
+    """Return the distinct values of e among the candidate pairs (k, 2) of shapes and the joints'
+    stops, ascending."""
     stops = [scene.contact.restitution] if _stop_count(scene) else []
     return np.unique(np.concatenate([restitution_by_pair(scene, pairs), stops]))
 
 
 class Frictions(NamedTuple):
-    """Coefficients of friction by class of shape: a table (k, k) for two classes, and the class (n,) of each shape."""
+    """Coefficients of friction by class of shape: a table (k, k) for two classes, and the class
+    (n,) of each shape."""
 
     class_of_shape: Integers
     table: Floats
@@ -214,11 +267,12 @@ class Frictions(NamedTuple):
 
 
 def frictions_of(scene: Scene) -> Frictions:
-    """Return mu of all pairs of shapes, in the order of `shapes_of`. The joints' stops follow, with mu = 0.
+    """Return mu of all pairs of shapes, in the order of `shapes_of`. The joints' stops follow, with
+    mu = 0.
 
-    It is the geometric mean of the two given values. If only one of the two gives a value, that value counts; if
-    neither does, `contact.friction` counts. So equal values are kept to the last bit, and everything slides on a body
-    with mu = 0.
+    It is the geometric mean of the two given values. If only one of the two gives a value, that
+    value counts; if neither does, `contact.friction` counts. So equal values are kept to the last
+    bit, and everything slides on a body with mu = 0.
     """
     alike: dict[float | None, int] = {}
     classes = [alike.setdefault(owner.friction, len(alike)) for _, owner, _ in _owned_shapes(scene)]

@@ -1,6 +1,7 @@
 """Scene: the fields of a scene file, in the plane and in space. A scene never names a contact law.
 
-A file with ``dimensions: 3`` is a scene in space. Its vectors have three numbers; everything else is as in the plane.
+A file with ``dimensions: 3`` is a scene in space. Its vectors have three numbers; everything else
+is as in the plane.
 """
 
 from __future__ import annotations
@@ -12,13 +13,30 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Set
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Field, PrivateAttr, ValidationError, ValidationInfo, field_validator
+from pydantic import (
+    BeforeValidator,
+    Field,
+    PrivateAttr,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+)
 from pydantic.json_schema import models_json_schema
 
 from iapb.errors import ArgumentError, SceneError
 from iapb.mechanics.joints import KINDS
 from iapb.names import one_of
-from iapb.scene.bodies import INERTIAL, ORIGIN, WORLD, Body, SpatialBody, SpatialWall, V, Wall, counted
+from iapb.scene.bodies import (
+    INERTIAL,
+    ORIGIN,
+    WORLD,
+    Body,
+    SpatialBody,
+    SpatialWall,
+    V,
+    Wall,
+    counted,
+)
 from iapb.scene.document import Document, yaml_text
 from iapb.scene.expressions import Expression, function_of
 from iapb.scene.parts import (
@@ -50,36 +68,66 @@ MAX_DELAY = 1000  # steps
 Mistakes = Iterator[tuple[Path, Any, str]]
 PerCoordinate = tuple[NonNegative, ...]
 Gravity = Annotated[V | None, Field(description="acceleration [m/s2], world axes; default: none")]
-Bodies = Annotated[tuple[V, ...], Field(min_length=1, max_length=MAX_BODIES,
-                                        description="what can move, each after its parent")]
+Bodies = Annotated[
+    tuple[V, ...],
+    Field(min_length=1, max_length=MAX_BODIES, description="what can move, each after its parent"),
+]
 Walls = Annotated[tuple[V, ...], Field(max_length=MAX_WALLS, description="the static world")]
 
 
 class Contact(ScenePart):
-    """How contacts behave. The defaults are the paper's values; where it gives none, they are this project's."""
+    """How contacts behave. The defaults are the paper's values; where it gives none, they are this
+    project's."""
 
-    forces: Literal["implicit", "paper"] = Field("implicit", description="implicit (default): resting forces that no "
-        "stiffness or step makes unstable, Coulomb's friction, also in impacts, stiffness and damping chosen for a sag "
-        "below 0.1 mm; paper: explicit (5) and (6), impacts without friction, K = 1000, B = 50; contact: paper is "
-        "short for it")
-    stiffness: Gain = Field(1000.0, description="K of (5) [N/m]; default with forces: paper 1000, else chosen")
-    damping: Gain = Field(50.0, description="B of (5) [N s/m]; default with forces: paper 50, else chosen")
-    penalty: Literal["clamped", "printed"] = Field("clamped", description="clamped (default): never pulls; printed: "
-        "(5) to the letter, may pull")
+    forces: Literal["implicit", "paper"] = Field(
+        "implicit",
+        description="implicit (default): resting forces that no "
+        "stiffness or step makes unstable, Coulomb's friction, also in impacts, stiffness and "
+        "damping chosen for a sag "
+        "below 0.1 mm; paper: explicit (5) and (6), impacts without friction, K = 1000, B = 50; "
+        "contact: paper is "
+        "short for it",
+    )
+    stiffness: Gain = Field(
+        1000.0, description="K of (5) [N/m]; default with forces: paper 1000, else chosen"
+    )
+    damping: Gain = Field(
+        50.0, description="B of (5) [N s/m]; default with forces: paper 50, else chosen"
+    )
+    penalty: Literal["clamped", "printed"] = Field(
+        "clamped",
+        description="clamped (default): never pulls; printed: (5) to the letter, may pull",
+    )
     friction: NonNegative = Field(0.0, description="coefficient mu [1]; default 0 = no friction")
-    friction_velocity: Positive = Field(1e-3, description="v_threshold of (6) [m/s], with forces: paper: below it "
-        "friction grows linearly; default 1e-3, ours")
-    restitution: Fraction = Field(0.0, description="coefficient e of (10) [1], 0 plastic to 1 elastic; default 0")
-    approach_velocity: NonNegative = Field(1e-6, description="v_approach [m/s]: contacts that approach faster "
-        "collide; default 1e-6, ours")
-    cluster_distance: NonNegative = Field(0.0, description="contacts closer than this [m] become one; default 0 = no "
-        "clustering")
-    coherence_distance: NonNegative = Field(0.0, description="a contact this close [m] to one of the step before is "
-        "not new; must exceed the largest speed times the step; default 0 = no such filter")
-    self_collision_rows: Literal["relative", "per_body"] = Field("relative", description="rows of a collision of two "
-        "moving bodies: relative (12), default; per_body (13)-(14)")
-    self_collisions: Truth = Field(False, description="whether bodies of one tree, not neighbours in it, can touch; "
-        "default false")
+    friction_velocity: Positive = Field(
+        1e-3,
+        description="v_threshold of (6) [m/s], with forces: paper: below it "
+        "friction grows linearly; default 1e-3, ours",
+    )
+    restitution: Fraction = Field(
+        0.0, description="coefficient e of (10) [1], 0 plastic to 1 elastic; default 0"
+    )
+    approach_velocity: NonNegative = Field(
+        1e-6,
+        description="v_approach [m/s]: contacts that approach faster collide; default 1e-6, ours",
+    )
+    cluster_distance: NonNegative = Field(
+        0.0, description="contacts closer than this [m] become one; default 0 = no clustering"
+    )
+    coherence_distance: NonNegative = Field(
+        0.0,
+        description="a contact this close [m] to one of the step before is "
+        "not new; must exceed the largest speed times the step; default 0 = no such filter",
+    )
+    self_collision_rows: Literal["relative", "per_body"] = Field(
+        "relative",
+        description="rows of a collision of two "
+        "moving bodies: relative (12), default; per_body (13)-(14)",
+    )
+    self_collisions: Truth = Field(
+        False,
+        description="whether bodies of one tree, not neighbours in it, can touch; default false",
+    )
 
     _chosen: tuple[str, ...] = PrivateAttr(())
 
@@ -98,21 +146,33 @@ _SHORT = BeforeValidator(_spelled_out, json_schema_input_type=Literal["paper"] |
 
 
 class Hand(ScenePart):
-    """The hand: a force on one body. A constant force is the worst case for stability (paper, section VI).
+    """The hand: a force on one body. A constant force is the worst case for stability (paper,
+    section VI).
 
-    The force is the sum of `force`, `force_table` and `force_function`, evaluated in the middle of each step:
-    at its start, the velocity would keep an error of half a step of the first force.
+    The force is the sum of `force`, `force_table` and `force_function`, evaluated in the middle of
+    each step: at its start, the velocity would keep an error of half a step of the first force.
     """
 
     body: Name = Field(description="the body that the hand holds")
-    point: Vector2 = Field((0.0, 0.0), description="where it holds it [m], body axes; default: the body's origin")
-    force: tuple[Number, Number, Number] = Field((0.0, 0.0, 0.0), description="constant force and torque [N, N, N m], "
-        "world axes; default: none")
-    force_table: Annotated[tuple[tuple[Number, ...], ...], Field(max_length=MAX_ROWS)] = Field((), description="rows "
-        "of time [s] and force as in force; linear in between, the first row before it and the last one after it; "
-        "default: none")
-    force_function: tuple[Expression, ...] = Field((), description="the force as functions of the time t [s], one "
-        "text for each number of force, such as 0.5*sin(2*pi*t); default: none")
+    point: Vector2 = Field(
+        (0.0, 0.0), description="where it holds it [m], body axes; default: the body's origin"
+    )
+    force: tuple[Number, Number, Number] = Field(
+        (0.0, 0.0, 0.0),
+        description="constant force and torque [N, N, N m], world axes; default: none",
+    )
+    force_table: Annotated[tuple[tuple[Number, ...], ...], Field(max_length=MAX_ROWS)] = Field(
+        (),
+        description="rows "
+        "of time [s] and force as in force; linear in between, the first row before it and the "
+        "last one after it; "
+        "default: none",
+    )
+    force_function: tuple[Expression, ...] = Field(
+        (),
+        description="the force as functions of the time t [s], one "
+        "text for each number of force, such as 0.5*sin(2*pi*t); default: none",
+    )
 
     @field_validator("force_table", "force_function")
     @classmethod
@@ -121,10 +181,14 @@ class Hand(ScenePart):
         if info.field_name == "force_function":
             require(len(given) in (0, count), f"{count} texts, one for each number of force")
             return given
-        require(all(len(row) == 1 + count for row in given),
-                f"rows of {1 + count} numbers: the time, then {count} as in force")
-        require(all(after[0] > before[0] for before, after in itertools.pairwise(given)),
-                "rows in the order of their times, none twice")
+        require(
+            all(len(row) == 1 + count for row in given),
+            f"rows of {1 + count} numbers: the time, then {count} as in force",
+        )
+        require(
+            all(after[0] > before[0] for before, after in itertools.pairwise(given)),
+            "rows in the order of their times, none twice",
+        )
         return given
 
     @property
@@ -144,14 +208,20 @@ class Hand(ScenePart):
         if self.force_table:
             force = [a + b for a, b in zip(force, _between(self.force_table, time), strict=True)]
         if self.force_function:
-            force = [a + function_of(text)(time) for a, text in zip(force, self.force_function, strict=True)]
+            force = [
+                a + function_of(text)(time)
+                for a, text in zip(force, self.force_function, strict=True)
+            ]
         return force
 
     def largest_force(self, duration: float = 0.0) -> float:
-        """Return the magnitude of the largest force [N] at t = 0, at the table's times and 200 times of a function."""
+        """Return the magnitude of the largest force [N] at t = 0, at the table's times and 200
+        times of a function."""
         times = [0.0, *(row[0] for row in self.force_table)]
         times += [k * duration / 200.0 for k in range(201)] if self.force_function else []
-        return max(math.hypot(*force[: 2 if len(force) == 3 else 3]) for force in map(self.force_at, times))
+        return max(
+            math.hypot(*force[: 2 if len(force) == 3 else 3]) for force in map(self.force_at, times)
+        )
 
 
 def _between(rows: tuple[tuple[float, ...], ...], time: float) -> list[float]:
@@ -169,20 +239,28 @@ class SpatialHand(Hand):
 
     point: Vector3 = Field(ORIGIN, description="where it holds the body [m], body axes")  # type: ignore[assignment]
     force: tuple[Number, Number, Number, Number, Number, Number] = Field(  # type: ignore[assignment]
-        (0.0,) * 6, description="constant force and torque [N, N, N, N m, N m, N m], world axes; default: none")
+        (0.0,) * 6,
+        description="constant force and torque [N, N, N, N m, N m, N m], world axes; default: none",
+    )
 
 
 class Device(ScenePart):
-    """The haptic device. It has the tool's kinematics, so its lists have one number per tool coordinate."""
+    """The haptic device. It has the tool's kinematics, so its lists have one number per tool
+    coordinate."""
 
-    force_limit: tuple[Positive, ...] | None = Field(None, description="largest force per coordinate [N, N m]; "
-        "default: no limit")
-    delay: Annotated[int, Field(strict=True, ge=0, le=MAX_DELAY)] = Field(0, description="steps between the device "
-        "and the world, each way; default 0")
-    position_resolution: PerCoordinate | None = Field(None, description="smallest step that its sensors see, per "
-        "coordinate [m, rad]; default: exact")
-    damping: PerCoordinate | None = Field(None, description="physical damping per coordinate [N s/m, N m s/rad]; "
-        "default: none")
+    force_limit: tuple[Positive, ...] | None = Field(
+        None, description="largest force per coordinate [N, N m]; default: no limit"
+    )
+    delay: Annotated[int, Field(strict=True, ge=0, le=MAX_DELAY)] = Field(
+        0, description="steps between the device and the world, each way; default 0"
+    )
+    position_resolution: PerCoordinate | None = Field(
+        None,
+        description="smallest step that its sensors see, per coordinate [m, rad]; default: exact",
+    )
+    damping: PerCoordinate | None = Field(
+        None, description="physical damping per coordinate [N s/m, N m s/rad]; default: none"
+    )
 
 
 class Gains(ScenePart):
@@ -200,27 +278,39 @@ class Couplings(ScenePart):
 
 
 class Scene(ScenePart):
-    """A scene to simulate: bodies, walls, contact parameters, and the hand that moves the tool (SI units)."""
+    """A scene to simulate: bodies, walls, contact parameters, and the hand that moves the tool (SI
+    units)."""
 
     name: Name = Field(description="the scene's name; runs are filed under it")
     title: Text = Field("", description="one line for reports")
     source: Text = Field("", description="where the scene comes from")
-    rate: Annotated[Positive, Field(le=MAX_RATE)] = Field(description="simulation rate [Hz]; the step is 1/rate")
+    rate: Annotated[Positive, Field(le=MAX_RATE)] = Field(
+        description="simulation rate [Hz]; the step is 1/rate"
+    )
     duration: Positive = Field(description="simulated time [s]")
     integrator: Literal["momentum", "semi_implicit_euler"] | None = Field(
-        None, description="how a step moves the bodies; default momentum, which keeps linear and angular momentum; in "
-        "the plane with contact.forces: paper semi_implicit_euler")
+        None,
+        description="how a step moves the bodies; default momentum, which keeps linear and angular momentum; in "
+        "the plane with contact.forces: paper semi_implicit_euler",
+    )
     gravity: Gravity[Vector2] = None
     bodies: Bodies[Body]
     walls: Walls[Wall] = ()
-    contact: Annotated[Contact, _SHORT] = Field(default_factory=lambda: Contact.model_validate({}), description="how "
-        "contacts behave")
+    contact: Annotated[Contact, _SHORT] = Field(
+        default_factory=lambda: Contact.model_validate({}), description="how contacts behave"
+    )
     hand: Hand | None = Field(None, description="the hand that holds the tool; default: nobody")
-    device: Device | None = Field(None, description="limits of the haptic device; default: an ideal one")
-    couplings: Couplings = Field(default_factory=lambda: Couplings.model_validate({}), description="gains between "
-        "device and tool")
+    device: Device | None = Field(
+        None, description="limits of the haptic device; default: an ideal one"
+    )
+    couplings: Couplings = Field(
+        default_factory=lambda: Couplings.model_validate({}),
+        description="gains between device and tool",
+    )
 
-    _source_text: str = PrivateAttr("")  # as read, or written at first use for a scene made of values
+    _source_text: str = PrivateAttr(
+        ""
+    )  # as read, or written at first use for a scene made of values
     _about: str = PrivateAttr("")  # comment above a text that is not yet written
     _file: str = PrivateAttr("")  # file that the text was read from, if any
 
@@ -234,7 +324,9 @@ class Scene(ScenePart):
 
     @classmethod
     def across_fields(cls, given: Any) -> Iterable[tuple[Path, Any, str]]:
-        if cls is Scene and any(body.get("joint") == "free_flyer" for body in _mappings(given, "bodies")):
+        if cls is Scene and any(
+            body.get("joint") == "free_flyer" for body in _mappings(given, "bodies")
+        ):
             yield ("dimensions",), MISSING, "3 for a scene in space: free_flyer is a joint there"
         yield from _across_parts(given)
 
@@ -275,14 +367,16 @@ class Scene(ScenePart):
         return self._source_text
 
     def place_of(self, *path: str | int) -> str:
-        """Return the place of a field as "file:line:column: "; empty if the scene was not read from a file."""
+        """Return the place of a field as "file:line:column: "; empty if the scene was not read from
+        a file."""
         if not self._file:
             return ""
         line, column = Document(self._source_text).place(path)
         return f"{self._file}:{line}:{column}: "
 
     def resolved(self) -> dict[str, Any]:
-        """Return every field with its value, defaults included, as plain numbers, texts, lists and mappings.
+        """Return every field with its value, defaults included, as plain numbers, texts, lists and
+        mappings.
 
         Contact fields that the toolkit will choose have no value yet and are left out.
         """
@@ -298,12 +392,14 @@ class Scene(ScenePart):
         ----------
         values
             new value by dotted path; items of a list by name or by number:
-            ``{"contact.friction": 0.3, "bodies.peg.position": [0, 0, 0.1], "bodies.peg.position.2": 0.1}``.
+            ``{"contact.friction": 0.3, "bodies.peg.position": [0, 0, 0.1], "bodies.peg.position.2":
+            0.1}``.
 
         Raises
         ------
         ArgumentError
-            a path does not exist, or `values` or one of them is of a type that no scene file can hold.
+            a path does not exist, or `values` or one of them is of a type that no scene file can
+            hold.
         SceneError
             values are invalid; the error lists all of them with their paths.
         """
@@ -315,7 +411,9 @@ class Scene(ScenePart):
         try:
             made = type(self).model_validate(plain)
         except ValidationError as failure:
-            raise SceneError(mistakes_of(failure, f"scene {self.name} with new values", plain)) from failure
+            raise SceneError(
+                mistakes_of(failure, f"scene {self.name} with new values", plain)
+            ) from failure
         made._about = f"{self.name} with new values for {', '.join(values) or 'nothing'}"
         return made
 
@@ -323,22 +421,30 @@ class Scene(ScenePart):
 class SpatialScene(Scene):
     """A scene in space: like `Scene`, but vectors have three numbers."""
 
-    dimensions: Literal[3] = Field(description="3: a scene in space; a scene without this field is planar")
+    dimensions: Literal[3] = Field(
+        description="3: a scene in space; a scene without this field is planar"
+    )
     gravity: Gravity[Vector3] = None  # type: ignore[assignment]
     bodies: Bodies[SpatialBody]  # type: ignore[assignment]
     walls: Walls[SpatialWall] = ()  # type: ignore[assignment]
-    hand: SpatialHand | None = Field(None, description="the hand that holds the tool; default: nobody")
+    hand: SpatialHand | None = Field(
+        None, description="the hand that holds the tool; default: nobody"
+    )
 
 
 def _across_parts(given: Any) -> Mistakes:
-    """Yield path, value and expectation of each mistake between the parts: names, parents, lists as long as the tool.
+    """Yield path, value and expectation of each mistake between the parts: names, parents, lists as
+    long as the tool.
 
     It uses the plain values of the file, so it reports its mistakes even if other fields are wrong.
     """
     if not isinstance(given, dict):
         return
     bodies, walls = _mappings(given, "bodies"), _mappings(given, "walls")
-    for where, items, known in (("bodies", bodies, {WORLD: "the static world"}), ("walls", walls, {})):
+    for where, items, known in (
+        ("bodies", bodies, {WORLD: "the static world"}),
+        ("walls", walls, {}),
+    ):
         for i, item in enumerate(items):
             name = _text(item, "name")
             if name in known:
@@ -351,7 +457,9 @@ def _across_parts(given: Any) -> Mistakes:
         if parent not in (None, WORLD) and parent not in names[:i]:
             order = "listed before it" if parent in names else "of this scene"
             yield ("bodies", i, "parent"), parent, f"world, or the name of a body {order}"
-        if i and roots[i] not in (None, roots[i - 1]) and roots[i] in roots[:i]:  # M would not be block diagonal
+        if (
+            i and roots[i] not in (None, roots[i - 1]) and roots[i] in roots[:i]
+        ):  # M would not be block diagonal
             yield ("bodies", i), names[i], f"its place among the other bodies of {roots[i]}'s tree"
     if bodies and all(body.get("joint") == "fixed" for body in bodies):
         yield ("bodies", 0, "joint"), "fixed", "at least one body of the scene that can move"
@@ -362,9 +470,14 @@ def _across_parts(given: Any) -> Mistakes:
 
 
 def _mappings(given: Any, field: str) -> list[dict[str, Any]]:
-    """Return the items of a list; an item that is no mapping becomes an empty one, to keep the numbering."""
+    """Return the items of a list; an item that is no mapping becomes an empty one, to keep the
+    numbering."""
     items = given.get(field) if isinstance(given, dict) else None
-    return [item if isinstance(item, dict) else {} for item in items] if isinstance(items, list | tuple) else []
+    return (
+        [item if isinstance(item, dict) else {} for item in items]
+        if isinstance(items, list | tuple)
+        else []
+    )
 
 
 def _text(given: Any, field: str, default: str | None = None) -> str | None:
@@ -381,8 +494,11 @@ def _roots(bodies: list[dict[str, Any]]) -> list[str | None]:
     return [root[_text(body, "name")] for body in bodies]
 
 
-def _tool(given: Any, bodies: list[dict[str, Any]], names: list[str | None], roots: list[str | None]) -> Mistakes:
-    """Check that the hand's body exists and moves, and that its lists have one entry per coordinate of the tool."""
+def _tool(
+    given: Any, bodies: list[dict[str, Any]], names: list[str | None], roots: list[str | None]
+) -> Mistakes:
+    """Check that the hand's body exists and moves, and that its lists have one entry per coordinate
+    of the tool."""
     hand, gains, held = given.get("hand"), given.get("couplings"), _text(given.get("hand"), "body")
     sections: list[tuple[Path, Any]] = [(("device",), given.get("device"))]
     if hand is None:
@@ -397,16 +513,24 @@ def _tool(given: Any, bodies: list[dict[str, Any]], names: list[str | None], roo
     root, joints = roots[names.index(held)], [_text(body, "joint") for body in bodies]
     if root is None or None in roots or not all(joint in KINDS for joint in joints):
         return
-    coordinates = sum(KINDS[str(joint)].nv for joint, own in zip(joints, roots, strict=True) if own == root)
+    coordinates = sum(
+        KINDS[str(joint)].nv for joint, own in zip(joints, roots, strict=True) if own == root
+    )
     if coordinates == 0:
         yield ("hand", "body"), held, "a body that can move"
     if isinstance(gains, dict):
-        sections += [(("couplings", name), gains.get(name)) for name in ("four_channel", "unilateral")]
+        sections += [
+            (("couplings", name), gains.get(name)) for name in ("four_channel", "unilateral")
+        ]
     for path, section in sections:
         for field in ("force_limit", "position_resolution", "stiffness", "damping"):
             numbers = section.get(field) if isinstance(section, dict) else None
             if isinstance(numbers, list | tuple) and len(numbers) != coordinates:
-                yield (*path, field), numbers, f"{counted(coordinates)}, one per coordinate of the tool"
+                yield (
+                    (*path, field),
+                    numbers,
+                    f"{counted(coordinates)}, one per coordinate of the tool",
+                )
 
 
 def scene_kind(given: Any) -> type[Scene]:
@@ -415,7 +539,8 @@ def scene_kind(given: Any) -> type[Scene]:
 
 
 def set_value(plain: dict[str, Any], path: Any, value: Any) -> None:
-    """Set a value at a dotted path of a resolved scene, without checks; missing sections are added."""
+    """Set a value at a dotted path of a resolved scene, without checks; missing sections are
+    added."""
     if not isinstance(path, str) or not path:
         raise ArgumentError("values", path, "dotted paths as keys, such as contact.friction")
     *steps, last = path.split(".")
@@ -429,7 +554,9 @@ def set_value(plain: dict[str, Any], path: Any, value: Any) -> None:
         place.pop(replaced, None)
     if isinstance(value, Set | Iterator):  # has no order, or can be read once only
         raise ArgumentError("values", value, "numbers, texts, lists or mappings")
-    place[_key(place, last, path)] = value.tolist() if hasattr(value, "tolist") else copy.deepcopy(value)
+    place[_key(place, last, path)] = (
+        value.tolist() if hasattr(value, "tolist") else copy.deepcopy(value)
+    )
 
 
 def _key(place: Any, step: str, path: str) -> str | int:
@@ -437,7 +564,9 @@ def _key(place: Any, step: str, path: str) -> str | int:
     if isinstance(place, dict):
         return step
     if not isinstance(place, list):
-        raise ArgumentError("values", path, f"a path to a field; before {step!r} stands a value without fields")
+        raise ArgumentError(
+            "values", path, f"a path to a field; before {step!r} stands a value without fields"
+        )
     names = [item.get("name") if isinstance(item, dict) else None for item in place]
     if step in names:
         return names.index(step)
@@ -453,18 +582,32 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 def scene_schema() -> dict[str, Any]:
     """Return the JSON Schema of scene files; the description of each field gives its default.
 
-    As in the reader, a file with the field `dimensions` is a scene in space, any other file a planar scene.
+    As in the reader, a file with the field `dimensions` is a scene in space, any other file a
+    planar scene.
     """
-    _, schema = models_json_schema([(model, "validation") for model in (Scene, SpatialScene, Robot)])
-    space = schema["$defs"]["SpatialScene"]  # with bodies, or robots that the reader turns into bodies
-    space["properties"]["robots"] = {"type": "array", "items": {"$ref": "#/$defs/Robot"},
-                                     "description": "URDF files that become bodies; default: none"}
+    _, schema = models_json_schema(
+        [(model, "validation") for model in (Scene, SpatialScene, Robot)]
+    )
+    space = schema["$defs"][
+        "SpatialScene"
+    ]  # with bodies, or robots that the reader turns into bodies
+    space["properties"]["robots"] = {
+        "type": "array",
+        "items": {"$ref": "#/$defs/Robot"},
+        "description": "URDF files that become bodies; default: none",
+    }
     least = {"minItems": space["properties"]["bodies"].pop("minItems")}
     space["required"].remove("bodies")
-    space["anyOf"] = [{"required": ["bodies"], "properties": {"bodies": least}}, {"required": ["robots"]}]
+    space["anyOf"] = [
+        {"required": ["bodies"], "properties": {"bodies": least}},
+        {"required": ["robots"]},
+    ]
     return {
-        "$schema": DIALECT, "title": "Scene file", "type": "object",
+        "$schema": DIALECT,
+        "title": "Scene file",
+        "type": "object",
         "if": {"required": ["dimensions"]},
-        "then": {"$ref": "#/$defs/SpatialScene"}, "else": {"$ref": "#/$defs/Scene"},
+        "then": {"$ref": "#/$defs/SpatialScene"},
+        "else": {"$ref": "#/$defs/Scene"},
         "$defs": schema["$defs"],
     }

@@ -1,4 +1,5 @@
-"""Common base of all parts of a scene: bounded numbers, names, and mistakes in terms of the scene file."""
+"""Common base of all parts of a scene: bounded numbers, names, and mistakes in terms of the scene
+file."""
 
 from __future__ import annotations
 
@@ -6,15 +7,25 @@ import re
 from collections.abc import Callable, Iterable
 from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ModelWrapValidatorHandler, ValidationError, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ModelWrapValidatorHandler,
+    ValidationError,
+    model_validator,
+)
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from iapb.errors import Mistake, shown
 from iapb.names import nearest
 
-LARGEST_NUMBER = 1e9  # SI units; products of four such numbers are far below the double overflow limit
+LARGEST_NUMBER = (
+    1e9  # SI units; products of four such numbers are far below the double overflow limit
+)
 STIFFEST = 1e15  # [N/m, N s/m] of contacts: heavier loads than any scene's sag by less than 0.1 mm
-SMALLEST_POSITIVE = 1e-18  # the inertia of a grain; positive values may be divisors: their square must not underflow
+# the inertia of a grain; positive values may be divisors: their square must not underflow
+SMALLEST_POSITIVE = 1e-18
 
 _FINITE = {"strict": True, "allow_inf_nan": False}
 Number = Annotated[float, Field(ge=-LARGEST_NUMBER, le=LARGEST_NUMBER, **_FINITE)]
@@ -22,10 +33,18 @@ Positive = Annotated[float, Field(ge=SMALLEST_POSITIVE, le=LARGEST_NUMBER, **_FI
 NonNegative = Annotated[float, Field(ge=0.0, le=LARGEST_NUMBER, **_FINITE)]
 Gain = Annotated[float, Field(ge=0.0, le=STIFFEST, **_FINITE)]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0, **_FINITE)]
-OwnRestitution = Annotated[Fraction | None, Field(
-    description="its own e of (10) [1]; of two that touch the smaller counts; default: the other's, or contact's")]
-OwnFriction = Annotated[NonNegative | None, Field(
-    description="its own mu [1]; of two that touch the geometric mean; default: the other's, or contact's")]
+OwnRestitution = Annotated[
+    Fraction | None,
+    Field(
+        description="its own e of (10) [1]; of two that touch the smaller counts; default: the other's, or contact's"
+    ),
+]
+OwnFriction = Annotated[
+    NonNegative | None,
+    Field(
+        description="its own mu [1]; of two that touch the geometric mean; default: the other's, or contact's"
+    ),
+]
 Vector2 = tuple[Number, Number]
 Vector3 = tuple[Number, Number, Number]
 Truth = Annotated[bool, Field(strict=True)]
@@ -36,7 +55,8 @@ Path = tuple[str | int, ...]  # of a value, such as ("bodies", 0, "mass")
 
 
 def expectation(expected: str) -> PydanticCustomError:
-    """Return the error for a field that breaks a rule of this project; its message says what was expected."""
+    """Return the error for a field that breaks a rule of this project; its message says what was
+    expected."""
     return PydanticCustomError("scene", "{expected}", {"expected": expected})
 
 
@@ -61,28 +81,36 @@ class ScenePart(BaseModel):
 
     @classmethod
     def across_fields(cls, given: Any) -> Iterable[tuple[Path, Any, str]]:
-        """Return path, value and expectation of each mistake that concerns several fields together."""
+        """Return path, value and expectation of each mistake that concerns several fields
+        together."""
         return ()
 
     @model_validator(mode="wrap")
     @classmethod
     def _all_at_once(cls, given: Any, validate: ModelWrapValidatorHandler[Self]) -> Self:
-        """Report mistakes of single fields and across fields together, and say what was expected."""
-        mistakes = [InitErrorDetails(type=expectation(expected), loc=path, input=value)
-                    for path, value, expected in cls.across_fields(given)]
+        """Report mistakes of single fields and across fields together, and say what was
+        expected."""
+        mistakes = [
+            InitErrorDetails(type=expectation(expected), loc=path, input=value)
+            for path, value, expected in cls.across_fields(given)
+        ]
         try:
             part = validate(given)
         except ValidationError as failure:
             # a list also counts as too short if its invalid items were left out
-            mistakes += [cls._explained(error) for error in failure.errors(include_url=False)
-                         if error["type"] != "too_short" or len(error["input"]) < error["ctx"]["min_length"]]
+            mistakes += [
+                cls._explained(error)
+                for error in failure.errors(include_url=False)
+                if error["type"] != "too_short" or len(error["input"]) < error["ctx"]["min_length"]
+            ]
         if mistakes:
             raise ValidationError.from_exception_data(cls.__name__, mistakes)
         return part
 
     @classmethod
     def _explained(cls, error: Any) -> InitErrorDetails:
-        """Turn pydantic's error into one whose message says what was expected, in terms of the scene file."""
+        """Turn pydantic's error into one whose message says what was expected, in terms of the
+        scene file."""
         kind, where, words = error["type"], error["loc"], error.get("ctx", {})
         expected, value = error["msg"], error["input"]
         if kind in _EXPECTED:
@@ -125,8 +153,9 @@ _EXPECTED = {
 StandsAt = Callable[[Path, bool], tuple[int, int]]
 
 
-def mistakes_of(failure: ValidationError, file: str, read: Any, place: StandsAt | None = None, inside: Path = ()
-                ) -> list[Mistake]:
+def mistakes_of(
+    failure: ValidationError, file: str, read: Any, place: StandsAt | None = None, inside: Path = ()
+) -> list[Mistake]:
     """Return pydantic's errors about the values at a path `inside` those `read` as mistakes.
 
     `place` maps a path, and whether its key is meant, to line and column; without it they are 0.

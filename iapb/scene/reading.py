@@ -1,4 +1,5 @@
-"""Find and read scene files; report every mistake with file, line, column, field path and expected value."""
+"""Find and read scene files; report every mistake with file, line, column, field path and expected
+value."""
 
 from __future__ import annotations
 
@@ -33,7 +34,8 @@ def scene_folder() -> Path:
 
 
 def scene_names(folder: str = "") -> tuple[str, ...]:
-    """Return the names of the scenes that come with the project, sorted; with a folder, of the files in it."""
+    """Return the names of the scenes that come with the project, sorted; with a folder, of the
+    files in it."""
     return tuple(sorted(path.stem for path in (scene_folder() / folder).glob("*.yaml")))
 
 
@@ -67,8 +69,11 @@ def find_scene(name: str | Path, folder: str = "") -> Path:
     said, near = one_of(path.stem, scene_names(folder), "a file, or one of: "), ""
     if path.suffix:  # a file was meant
         near = nearest(path.name, (file.name for file in path.parent.glob(f"*{path.suffix}")))
-    raise ArgumentError("scene", str(name), f"{said.partition('; did')[0]}; did you mean {path.parent / near}?" if near
-                        else said)
+    raise ArgumentError(
+        "scene",
+        str(name),
+        f"{said.partition('; did')[0]}; did you mean {path.parent / near}?" if near else said,
+    )
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -108,7 +113,9 @@ def read_text(path: str | Path) -> str:
     except UnicodeDecodeError as failure:
         line = content.count(b"\n", 0, failure.start) + 1
         wrong = shown(content[failure.start : failure.end])
-        raise SceneError([Mistake(str(path), line, 1, "(file)", wrong, "text in UTF-8")]) from failure
+        raise SceneError(
+            [Mistake(str(path), line, 1, "(file)", wrong, "text in UTF-8")]
+        ) from failure
     return text
 
 
@@ -130,7 +137,9 @@ def scene_from_text(text: str, file: str = "(text)") -> Scene:
     return scene
 
 
-def checked(kind: type[Part], given: Any, document: Document, mistakes: list[Mistake], what: str = "scene") -> Part:
+def checked(
+    kind: type[Part], given: Any, document: Document, mistakes: list[Mistake], what: str = "scene"
+) -> Part:
     """Return the values `given` of a document as a part.
 
     Raises
@@ -160,5 +169,7 @@ def scene_from_values(given: Any) -> Scene:
         scene: Scene = scene_kind(given).model_validate(given)
     except ValidationError as failure:
         wrong = failure.errors()[0]
-        raise ArgumentError("scene " + ".".join(map(str, wrong["loc"])), wrong["input"], wrong["msg"]) from None
+        raise ArgumentError(
+            "scene " + ".".join(map(str, wrong["loc"])), wrong["input"], wrong["msg"]
+        ) from None
     return scene

@@ -1,4 +1,5 @@
-"""Impacts as complementarity problems: problems, solutions with recomputed residuals, solvers and laws."""
+"""Impacts as complementarity problems: problems, solutions with recomputed residuals, solvers and
+laws."""
 
 from reference.complementarity.problem import ImpactProblem
 from reference.complementarity.solution import Residuals, Solution

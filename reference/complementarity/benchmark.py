@@ -1,6 +1,8 @@
-"""Benchmark of solvers: one row per solver and problem with recomputed residuals, and their performance profile.
+"""Benchmark of solvers: one row per solver and problem with recomputed residuals, and their
+performance profile.
 
-Source of the profile: Dolan and Moré, Benchmarking optimization software with performance profiles (2002).
+Source of the profile: Dolan and Moré, Benchmarking optimization software with performance profiles
+(2002).
 """
 
 from __future__ import annotations
@@ -22,10 +24,11 @@ from reference.complementarity.solvers import solve, solver_names
 class SolverRow:
     """One solver on one problem.
 
-    verdict : "solved", "refused", "failed", "missing" (the solver is not installed) or "left out" (it needed more than
-        `longest` for an earlier problem)
-    spread : largest difference of contact velocities from the best solution, relative to the velocity scale; NaN if
-        this solver did not solve the problem. Impulses are not compared, because they are not unique
+    verdict : "solved", "refused", "failed", "missing" (the solver is not installed) or "left out"
+        (it needed more than `longest` for an earlier problem)
+    spread : largest difference of contact velocities from the best solution, relative to the
+        velocity scale; NaN if this solver did not solve the problem. Impulses are not compared,
+        because they are not unique
     asymmetry : relative asymmetry of the problem's W if it is beyond rounding, else 0
     """
 
@@ -41,13 +44,17 @@ class SolverRow:
 
 
 def run_solvers(
-    problem: ImpactProblem, solvers: Iterable[str] | None = None, longest: float = np.inf,
-    slow: dict[str, float] | None = None, progress: Callable[[], object] = lambda: None,
+    problem: ImpactProblem,
+    solvers: Iterable[str] | None = None,
+    longest: float = np.inf,
+    slow: dict[str, float] | None = None,
+    progress: Callable[[], object] = lambda: None,
 ) -> list[SolverRow]:
     """Solve a problem with every solver of its kind, or with `solvers`.
 
-    A solver that needs more than `longest` [s] is added to `slow` with its time. The solvers in `slow` are left out, so
-    give the smallest problems first. `progress` is called before each solver starts.
+    A solver that needs more than `longest` [s] is added to `slow` with its time. The solvers in
+    `slow` are left out, so give the smallest problems first. `progress` is called before each
+    solver starts.
     """
     asymmetry = problem.asymmetry if problem.asymmetry > SYMMETRY_TOLERANCE else 0.0
     slow = {} if slow is None else slow
@@ -64,17 +71,34 @@ def run_solvers(
             missing.append(row("missing", str(error)))
     best, rows = min(found, key=lambda s: s.residuals.worst, default=None), list[SolverRow]()
     for s in found:
-        apart = np.abs(s.gamma_plus - best.gamma_plus).max(initial=0.0) if best and s.solved() else np.nan
-        rows.append(SolverRow(problem.name, problem.size, s.solver, asymmetry, s.verdict(), s.note, s.residuals,
-                              s.seconds, float(apart / velocity_scale(problem))))  # fmt: skip
+        apart = (
+            np.abs(s.gamma_plus - best.gamma_plus).max(initial=0.0)
+            if best and s.solved()
+            else np.nan
+        )
+        rows.append(
+            SolverRow(
+                problem.name,
+                problem.size,
+                s.solver,
+                asymmetry,
+                s.verdict(),
+                s.note,
+                s.residuals,
+                s.seconds,
+                float(apart / velocity_scale(problem)),
+            )
+        )
     slow.update({s.solver: s.seconds for s in found if s.seconds > longest})
     return rows + missing + left_out
 
 
 def performance_profile(rows: Sequence[SolverRow], factors: Floats) -> dict[str, Floats]:
-    """Return per solver the share of problems solved within each factor (>= 1) of the fastest solver's time.
+    """Return per solver the share of problems solved within each factor (>= 1) of the fastest
+    solver's time.
 
-    All problems count, including those that no solver solved. A solver that is not installed has no curve.
+    All problems count, including those that no solver solved. A solver that is not installed has no
+    curve.
     """
     names = sorted({row.solver for row in rows if row.verdict != "missing"})
     problems = sorted({row.problem for row in rows})

@@ -1,11 +1,13 @@
-"""Impact laws by name: the statement of each, its source, and the hypotheses under which it is consistent.
+"""Impact laws by name: the statement of each, its source, and the hypotheses under which it is
+consistent.
 
-All laws act on an ImpactProblem with known mechanics (`ImpactProblem.from_impact`) with E = diag(restitution), and
-return v⁺ and the impulses. The equality laws share no algorithm with the engine: they solve A x = target by singular
-values (lstsq), while the engine orthogonalises rows.
+All laws act on an ImpactProblem with known mechanics (`ImpactProblem.from_impact`) with E =
+diag(restitution), and return v⁺ and the impulses. The equality laws share no algorithm with the
+engine: they solve A x = target by singular values (lstsq), while the engine orthogonalises rows.
 
-With redundant contacts, many p give the same generalized impulse Jᵀp. A negative entry of the minimum-norm p alone does
-not mean adhesion: the contacts pull only if *no* p >= 0 gives the same Jᵀp.
+With redundant contacts, many p give the same generalized impulse Jᵀp. A negative entry of the
+minimum-norm p alone does not mean adhesion: the contacts pull only if *no* p >= 0 gives the same
+Jᵀp.
 """
 
 from __future__ import annotations
@@ -24,11 +26,12 @@ from reference.complementarity.solvers import solve
 
 # A solution of a law's LCP with a residual above this share of the velocity scale raises an error.
 LAW_TOLERANCE = 1e-9
-# Solvers for a frictionless LCP, tried in this order. For some redundant rows, active sets cycle and Lemke ends
-# on a ray; projections (Gauss-Seidel) do not, but may be slow. Each solution's residual is recomputed.
+# Solvers for a frictionless LCP, tried in this order. For some redundant rows, active sets cycle
+# and Lemke ends on a ray; projections (Gauss-Seidel) do not, but may be slow. Each solution's
+# residual is recomputed.
 LADDER = ("daqp", "quadprog", "lemke", "gauss_seidel")
-# Residual, as a share of |L⁻¹ Jᵀp|, below which a non-negative impulse exists: the active-set least squares ends near
-# 1e-13 for a consistent problem and far above for an inconsistent one.
+# Residual, as a share of |L⁻¹ Jᵀp|, below which a non-negative impulse exists: the active-set least
+# squares ends near 1e-13 for a consistent problem and far above for an inconsistent one.
 EXPLAINED = 1e-9
 ROUNDING = 1e-12  # share of the largest impulse below which a negative one counts as rounding error
 NONE, ARTEFACT, ADHESIVE = "none", "artefact of the minimum norm", "adhesive"
@@ -45,7 +48,8 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Law:
-    """An impact law: statement, source, hypotheses, and whether it never gains energy under them."""
+    """An impact law: statement, source, hypotheses, and whether it never gains energy under
+    them."""
 
     name: str
     statement: str
@@ -62,7 +66,8 @@ def newton_lcp(problem: ImpactProblem, solver: str | None = None) -> Outcome:
 
 
 def poisson(problem: ImpactProblem, solver: str | None = None) -> Outcome:
-    """Apply Poisson's law, p = p_c + p_e: 0 <= p_c ⟂ gamma_c >= 0, then 0 <= p_e − E p_c ⟂ gamma_plus >= 0."""
+    """Apply Poisson's law, p = p_c + p_e: 0 <= p_c ⟂ gamma_c >= 0, then 0 <= p_e − E p_c ⟂
+    gamma_plus >= 0."""
     compression = replace(problem, restitution=np.zeros(problem.contacts))
     p_c, first = _solved(compression, solver)
     returned = problem.restitution * p_c
@@ -73,7 +78,8 @@ def poisson(problem: ImpactProblem, solver: str | None = None) -> Outcome:
 
 
 def newton_equality(problem: ImpactProblem) -> Outcome:
-    """Apply gamma_plus = −E gamma_minus on every row, with p of either sign and least norm (the paper's (20)-(21)).
+    """Apply gamma_plus = −E gamma_minus on every row, with p of either sign and least norm (the
+    paper's (20)-(21)).
 
     Raises
     ------
@@ -85,20 +91,26 @@ def newton_equality(problem: ImpactProblem) -> Outcome:
         return Outcome(_known(problem.velocity), np.zeros(0))
     cholesky, length = np.linalg.cholesky(mass), np.linalg.norm(rows, axis=1)
     unit = np.where(length > 0.0, length, 1.0)[:, None]
-    # A = J L⁻ᵀ comes from a triangular solve with a relative error up to n ε κ(L). A smaller singular value may be
-    # rounding error of dependent rows, and dividing by it would turn noise into impulses.
+    # A = J L⁻ᵀ comes from a triangular solve with a relative error up to n ε κ(L). A smaller
+    # singular value may be rounding error of dependent rows, and dividing by it would turn noise
+    # into impulses.
     dependent = float(max(rows.shape) * np.finfo(np.float64).eps * np.linalg.cond(cholesky))
     change = np.linalg.lstsq(rows / unit, target / unit[:, 0], rcond=dependent)[0]
     shortest = float(unit.min() / unit.max())  # the least norm of p needs the rows without scaling
     impulse = np.linalg.lstsq(rows.T, change, rcond=dependent * shortest)[0]
     residual = float(np.abs(rows @ change - target).max() / (np.abs(target).max() or 1.0))
     if residual > LAW_TOLERANCE:
-        raise SolverError(f"contradicting equalities on redundant contacts: residual {residual:.1e}")
-    return Outcome(_known(problem.velocity) + np.linalg.solve(cholesky.T, change), impulse, residual)
+        raise SolverError(
+            f"contradicting equalities on redundant contacts: residual {residual:.1e}"
+        )
+    return Outcome(
+        _known(problem.velocity) + np.linalg.solve(cholesky.T, change), impulse, residual
+    )
 
 
 def coulomb_ncp(problem: ImpactProblem, solver: str = "nsgs") -> Outcome:
-    """Apply Coulomb's law K ∋ p ⟂ u + mu |u_T| n ∈ K*, u = gamma_plus + E gamma_minus on the normals."""
+    """Apply Coulomb's law K ∋ p ⟂ u + mu |u_T| n ∈ K*, u = gamma_plus + E gamma_minus on the
+    normals."""
     return newton_lcp(replace(problem, relaxed=False), solver)
 
 
@@ -107,8 +119,11 @@ def coulomb_ccp(problem: ImpactProblem, solver: str = "nsgs") -> Outcome:
     return newton_lcp(replace(problem, relaxed=True), solver)
 
 
-def pulling_share(contact_jacobian: ArrayLike, generalized_impulse: ArrayLike, mass_matrix: ArrayLike) -> float:
-    """Return the least |L⁻¹(Jᵀp − given)| / |L⁻¹ given| over all p >= 0, for J (c, d), given (d,) and M = L Lᵀ (d, d).
+def pulling_share(
+    contact_jacobian: ArrayLike, generalized_impulse: ArrayLike, mass_matrix: ArrayLike
+) -> float:
+    """Return the least |L⁻¹(Jᵀp − given)| / |L⁻¹ given| over all p >= 0, for J (c, d), given (d,)
+    and M = L Lᵀ (d, d).
 
     If it is at most EXPLAINED, some p gives the same motion without pulling.
     Source: Lawson and Hanson, Solving Least Squares Problems (1974), by `scipy.optimize.nnls`.
@@ -118,9 +133,14 @@ def pulling_share(contact_jacobian: ArrayLike, generalized_impulse: ArrayLike, m
     SolverError
         The least-squares iteration does not converge.
     """
-    rows, given = np.asarray(contact_jacobian, np.float64), np.asarray(generalized_impulse, np.float64)
+    rows, given = (
+        np.asarray(contact_jacobian, np.float64),
+        np.asarray(generalized_impulse, np.float64),
+    )
     if rows.ndim != 2 or rows.shape[1:] != given.shape:
-        raise ArgumentError("contact_jacobian", rows.shape, f"{len(given)} columns, as generalized_impulse")
+        raise ArgumentError(
+            "contact_jacobian", rows.shape, f"{len(given)} columns, as generalized_impulse"
+        )
     cholesky = np.linalg.cholesky(np.asarray(mass_matrix, np.float64))
     return unpushed_share(np.linalg.solve(cholesky, rows.T), np.linalg.solve(cholesky, given))
 
@@ -145,13 +165,16 @@ def adhesion(contact_jacobian: ArrayLike, impulses: ArrayLike, mass_matrix: Arra
     if p.min(initial=0.0) >= -ROUNDING * np.abs(p).max(initial=0.0):
         return NONE
     given = np.asarray(contact_jacobian, np.float64).T @ p
-    return ARTEFACT if pulling_share(contact_jacobian, given, mass_matrix) <= EXPLAINED else ADHESIVE
+    return (
+        ARTEFACT if pulling_share(contact_jacobian, given, mass_matrix) <= EXPLAINED else ADHESIVE
+    )
 
 
 def _solved(problem: ImpactProblem, solver: str | None, speed: float = 0.0) -> tuple[Floats, float]:
-    """Return p (n,) and its recomputed residual, by that solver or the first of LADDER that reaches LAW_TOLERANCE."""
-    # Relative to `speed` [m/s] if the problem's own velocities are smaller: after compression, only rounding errors may
-    # be left, and opposed rows may contradict each other in them.
+    """Return p (n,) and its recomputed residual, by that solver or the first of LADDER that reaches
+    LAW_TOLERANCE."""
+    # Relative to `speed` [m/s] if the problem's own velocities are smaller: after compression, only
+    # rounding errors may be left, and opposed rows may contradict each other in them.
     said, own = [], velocity_scale(problem)
     for name in LADDER if solver is None else (solver,):
         solution = solve(problem, name)
@@ -164,23 +187,62 @@ def _solved(problem: ImpactProblem, solver: str | None, speed: float = 0.0) -> t
 
 def _known(mechanics: Floats | None) -> Floats:
     if mechanics is None:
-        raise ArgumentError("problem", "without mechanics", "a problem made by ImpactProblem.from_impact")
+        raise ArgumentError(
+            "problem", "without mechanics", "a problem made by ImpactProblem.from_impact"
+        )
     return mechanics
 
 
-LAWS: dict[str, Law] = {law.name: law for law in (
-    Law("newton_lcp", "0 <= p ⟂ gamma_plus + E gamma_minus >= 0", "Moreau 1988; Glocker and Pfeiffer 1995",
-        "equal e, or all given contacts approach (gamma_minus <= 0)", True, newton_lcp),
-    Law("poisson", "0 <= p_c ⟂ gamma_c >= 0, then 0 <= p_e - E p_c ⟂ gamma_plus >= 0",
-        "Glocker and Pfeiffer 1995; Anitescu and Potra 1997", "any E in [0, 1], any gamma_minus", True, poisson),
-    Law("newton_equality", "gamma_plus = -E gamma_minus, p of either sign",
-        "Constantinescu, Salcudean, Croft 2005, (15)-(21)", "one e for all contacts", True, newton_equality),
-    Law("per_body_equality", "newton_equality with separate rows for each body",
-        "Constantinescu, Salcudean, Croft 2005, (13)-(14)",
-        "one e for all contacts; momentum is not conserved at self-collisions", True, newton_equality),
-    Law("coulomb_ncp", "K ∋ p ⟂ u + mu |u_T| n ∈ K*, u = gamma_plus + E gamma_minus on the normals",
-        "Moreau 1988; de Saxcé and Feng 1998", "e = 0; with e > 0 it can gain energy (Kane and Levinson 1985)", True,
-        coulomb_ncp),
-    Law("coulomb_ccp", "K ∋ p ⟂ u ∈ K*, u as in coulomb_ncp; sliding contacts open at mu |u_T|",
-        "Anitescu and Tasora 2010", "e = 0; with e > 0 it can gain energy", True, coulomb_ccp),
-)}  # fmt: skip
+LAWS: dict[str, Law] = {
+    law.name: law
+    for law in (
+        Law(
+            "newton_lcp",
+            "0 <= p ⟂ gamma_plus + E gamma_minus >= 0",
+            "Moreau 1988; Glocker and Pfeiffer 1995",
+            "equal e, or all given contacts approach (gamma_minus <= 0)",
+            True,
+            newton_lcp,
+        ),
+        Law(
+            "poisson",
+            "0 <= p_c ⟂ gamma_c >= 0, then 0 <= p_e - E p_c ⟂ gamma_plus >= 0",
+            "Glocker and Pfeiffer 1995; Anitescu and Potra 1997",
+            "any E in [0, 1], any gamma_minus",
+            True,
+            poisson,
+        ),
+        Law(
+            "newton_equality",
+            "gamma_plus = -E gamma_minus, p of either sign",
+            "Constantinescu, Salcudean, Croft 2005, (15)-(21)",
+            "one e for all contacts",
+            True,
+            newton_equality,
+        ),
+        Law(
+            "per_body_equality",
+            "newton_equality with separate rows for each body",
+            "Constantinescu, Salcudean, Croft 2005, (13)-(14)",
+            "one e for all contacts; momentum is not conserved at self-collisions",
+            True,
+            newton_equality,
+        ),
+        Law(
+            "coulomb_ncp",
+            "K ∋ p ⟂ u + mu |u_T| n ∈ K*, u = gamma_plus + E gamma_minus on the normals",
+            "Moreau 1988; de Saxcé and Feng 1998",
+            "e = 0; with e > 0 it can gain energy (Kane and Levinson 1985)",
+            True,
+            coulomb_ncp,
+        ),
+        Law(
+            "coulomb_ccp",
+            "K ∋ p ⟂ u ∈ K*, u as in coulomb_ncp; sliding contacts open at mu |u_T|",
+            "Anitescu and Tasora 2010",
+            "e = 0; with e > 0 it can gain energy",
+            True,
+            coulomb_ccp,
+        ),
+    )
+}

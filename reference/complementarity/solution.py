@@ -1,8 +1,9 @@
 """Solution: the answer of a solver, with residuals recomputed from the problem alone.
 
-The block of a contact has 1 (normal), 2 or 3 components, normal first. Coulomb's cone with friction mu is
-K = {(n, t): |t| <= mu n}; its dual is K* = {(n, t): n >= mu |t|}. Without friction K = K* = {n >= 0}.
-Source: Acary and Brogliato, Numerical Methods for Nonsmooth Dynamical Systems (2008), section 3.9.
+The block of a contact has 1 (normal), 2 or 3 components, normal first. Coulomb's cone with friction
+mu is K = {(n, t): |t| <= mu n}; its dual is K* = {(n, t): n >= mu |t|}. Without friction K = K* =
+{n >= 0}. Source: Acary and Brogliato, Numerical Methods for Nonsmooth Dynamical Systems (2008),
+section 3.9.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ import numpy as np
 from reference import Floats
 from reference.complementarity.problem import ImpactProblem
 
-# First-order solvers (OSQP, SCS, proxqp) reach about 1e-6 of the velocity scale, pivoting solvers 1e-12.
+# First-order solvers (OSQP, SCS, proxqp) reach about 1e-6 of the velocity scale, pivoting solvers
+# 1e-12.
 SOLVED_TOLERANCE = 1e-6
 
 
@@ -32,10 +34,16 @@ class Answer:
 class Residuals:
     """Residuals of an impulse, relative to the velocity scale; inf = unknown."""
 
-    impulse_cone: float = np.inf  #: distance of the scaled impulse from its cone (without friction: adhesive impulses)
-    velocity_cone: float = np.inf  #: distance of the complementary velocity from the dual cone (penetrating velocities)
+    impulse_cone: float = (
+        np.inf
+    )  #: distance of the scaled impulse from its cone (without friction: adhesive impulses)
+    velocity_cone: float = (
+        np.inf
+    )  #: distance of the complementary velocity from the dual cone (penetrating velocities)
     complementarity: float = np.inf  #: largest |p_i · w_i| of a contact
-    natural_map: float = np.inf  #: largest component of p - proj_K(p - w), which is zero only at solutions
+    natural_map: float = (
+        np.inf
+    )  #: largest component of p - proj_K(p - w), which is zero only at solutions
 
     @property
     def worst(self) -> float:
@@ -58,7 +66,11 @@ class Solution:
     def residuals(self) -> Residuals:
         """Residuals recomputed from the problem; all infinite without a usable impulse."""
         fits = self.impulse is not None and self.impulse.shape == self.problem.gamma_minus.shape
-        return residuals(self.problem, self.answer()) if fits and np.isfinite(self.answer()).all() else Residuals()
+        return (
+            residuals(self.problem, self.answer())
+            if fits and np.isfinite(self.answer()).all()
+            else Residuals()
+        )
 
     def solved(self, tolerance: float = SOLVED_TOLERANCE) -> bool:
         """Whether every recomputed residual is at most `tolerance` of the velocity scale."""
@@ -89,7 +101,8 @@ def velocity_scale(problem: ImpactProblem) -> float:
 
 
 def residuals(problem: ImpactProblem, impulse: Floats) -> Residuals:
-    """Return the residuals of `impulse` (n,), recomputed from the problem (scale: `velocity_scale`)."""
+    """Return the residuals of `impulse` (n,), recomputed from the problem (scale:
+    `velocity_scale`)."""
     if problem.size == 0:
         return Residuals(0.0, 0.0, 0.0, 0.0)
     mu, size, scale = problem.friction_or_zero, problem.contact_size, velocity_scale(problem)
@@ -105,8 +118,10 @@ def residuals(problem: ImpactProblem, impulse: Floats) -> Residuals:
     outside, penetrating = p - project_on_cone(p, mu), project_on_cone(-w, mu)
     return Residuals(
         float(np.linalg.norm(outside, axis=1).max()),
-        float(np.linalg.norm(penetrating, axis=1).max()), float(product.max()), float(np.abs(natural).max()),
-    )  # fmt: skip
+        float(np.linalg.norm(penetrating, axis=1).max()),
+        float(product.max()),
+        float(np.abs(natural).max()),
+    )
 
 
 def project_on_cone(blocks: Floats, friction: Floats) -> Floats:
@@ -121,7 +136,8 @@ def project_on_cone(blocks: Floats, friction: Floats) -> Floats:
 
 
 def de_saxce_shift(relative_velocity: Floats, friction: Floats) -> Floats:
-    """Return the velocity blocks with mu |u_T| added to the normal component (de Saxcé and Feng, 1998).
+    """Return the velocity blocks with mu |u_T| added to the normal component (de Saxcé and Feng,
+    1998).
 
     With this shift Coulomb's law reads K ∋ p ⟂ shifted velocity ∈ K*.
     """

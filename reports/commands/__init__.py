@@ -1,1 +1,2 @@
-"""The commands of `iapb`, one file each. Slow imports are inside the functions, so that --help answers at once."""
+"""The commands of `iapb`, one file each. Slow imports are inside the functions, so that --help
+answers at once."""

@@ -21,27 +21,46 @@ LONG = ("motions", "solvers", "budgets", "scaling", "robots")  # tables that --j
 
 
 def bench(
-    full: Annotated[bool, typer.Option("--full", help="More repeats and steps, and compile times.")] = False,
-    budget: Annotated[str, typer.Option("--budget", help="Name the method for an impact in this time, such as 50us.")]
-    = "",
+    full: Annotated[
+        bool, typer.Option("--full", help="More repeats and steps, and compile times.")
+    ] = False,
+    budget: Annotated[
+        str,
+        typer.Option("--budget", help="Name the method for an impact in this time, such as 50us."),
+    ] = "",
     contacts: Annotated[int, typer.Option("--contacts", help="Contacts of that impact.")] = 20,
-    coordinates: Annotated[int, typer.Option("--coordinates", help="Coordinates of that impact.")] = 6,
+    coordinates: Annotated[
+        int, typer.Option("--coordinates", help="Coordinates of that impact.")
+    ] = 6,
     json_: Json = False,
 ) -> Answer:
-    """Time a step, an impact and a motion; compare with MuJoCo, Pinocchio, solvers and the printed formula."""
+    """Time a step, an impact and a motion; compare with MuJoCo, Pinocchio, solvers and the printed
+    formula."""
     if budget:
         return _recommended(seconds_of(budget), contacts, coordinates)
     with stage_progress() as progress:
         topic = haptic_study("full" if full else "quick", partial(progress, "tables"))
         methods = work_precision(progress=partial(progress, "methods on problems"))
-    facts = {"processor": processor(), "verdict": topic.verdict, "parts": topic.parts, "failures": topic.failures,
-             "tables": {name: table.records() for name, table in topic.tables.items()} | {
-                 "methods on problems": methods.records()}}  # fmt: skip
+    facts = {
+        "processor": processor(),
+        "verdict": topic.verdict,
+        "parts": topic.parts,
+        "failures": topic.failures,
+        "tables": {name: table.records() for name, table in topic.tables.items()}
+        | {"methods on problems": methods.records()},
+    }
     shown = {name: table for name, table in topic.tables.items() if name not in LONG}
     shown["which method for a budget"] = choices(methods)
-    lines = [line for name, table in shown.items() for line in (f"\n{name.capitalize()}", table, sentence(table.note))]
+    lines = [
+        line
+        for name, table in shown.items()
+        for line in (f"\n{name.capitalize()}", table, sentence(table.note))
+    ]
     words = {REPRODUCED: "as asked for", MIXED: "not as asked for", NOT_COMPUTED: "not measured"}
-    lines += ["", *(sentence(f"{words[part.verdict]}: {part.sentence}", "• ") for part in topic.parts)]
+    lines += [
+        "",
+        *(sentence(f"{words[part.verdict]}: {part.sentence}", "• ") for part in topic.parts),
+    ]
     lines.append(f"Further tables with --json: {', '.join((*LONG, 'methods on problems'))}.")
     lines += [f"Not computed: {one.case}: {one.error}: {one.reason}" for one in topic.failures]
     return Answer(facts, lines, 1 if topic.failures else 0)
@@ -63,10 +82,18 @@ def seconds_of(text: str) -> float:
 
 
 def _recommended(budget: float, contacts: int, coordinates: int) -> Answer:
-    """Return the recommended method in one sentence for each way of calling, and the machine of the measurement."""
+    """Return the recommended method in one sentence for each way of calling, and the machine of the
+    measurement."""
     found = which_method(budget, contacts, coordinates)
-    none = (f"In {short_time(budget)} no method solves {contacts} contacts on {coordinates} coordinates without a gain "
-            "of energy.")  # fmt: skip
-    return Answer({"processor": processor(), "choices": found}, [
-        *(map(str, found) if found else (none,)),
-        f"Measured on {processor()}, {date.today()}, on nine hard impacts of this size."])
+    none = (
+        f"In {short_time(budget)} no method solves {contacts} contacts on {coordinates} "
+        f"coordinates without a gain "
+        "of energy."
+    )
+    return Answer(
+        {"processor": processor(), "choices": found},
+        [
+            *(map(str, found) if found else (none,)),
+            f"Measured on {processor()}, {date.today()}, on nine hard impacts of this size.",
+        ],
+    )

@@ -1,4 +1,5 @@
-"""`iapb check SCENE`: find problems that would make a run of the scene worthless, before the run."""
+"""`iapb check SCENE`: find problems that would make a run of the scene worthless, before the
+run."""
 
 from __future__ import annotations
 
@@ -18,7 +19,8 @@ def check(
     set_: Values = None,
     json_: Json = False,
 ) -> Answer:
-    """Warn of problems that would make a run of SCENE worthless, with values to set; end with 3 then."""
+    """Warn of problems that would make a run of SCENE worthless, with values to set; end with 3
+    then."""
     source, remarks = chosen_scene(scene_given(scene, set_))
     law = find_world(world).law
     law = law.within(source) if hasattr(law, "within") else law
@@ -31,9 +33,24 @@ def check(
     if source.contact.forces == "paper":  # implicit contact has no such limits
         limits = step_limits(Start(source))
     if limits is not None:
-        lines.append(f"At {source.rate:g} Hz the step holds contact.stiffness <= {limits.stiffness:.3g} N/m and "
-                     f"contact.damping <= {limits.damping:.3g} N s/m, each with the other unchanged; critical "
-                     f"contacts: {limits.where}, effective mass {limits.mass:.3g} kg.")
-    lines += [f"Warning: {caution}." for caution in cautions] or [f"Nothing wrong with {source.name} was found."]
-    return Answer({"scene": source.name, "world": world, "remarks": remarks, "limits": limits, "warnings": cautions},
-                  lines, DISTRUSTED if cautions else 0)
+        lines.append(
+            f"At {source.rate:g} Hz the step holds contact.stiffness <= {limits.stiffness:.3g} "
+            f"N/m and "
+            f"contact.damping <= {limits.damping:.3g} N s/m, each with the other unchanged; "
+            f"critical "
+            f"contacts: {limits.where}, effective mass {limits.mass:.3g} kg."
+        )
+    lines += [f"Warning: {caution}." for caution in cautions] or [
+        f"Nothing wrong with {source.name} was found."
+    ]
+    return Answer(
+        {
+            "scene": source.name,
+            "world": world,
+            "remarks": remarks,
+            "limits": limits,
+            "warnings": cautions,
+        },
+        lines,
+        DISTRUSTED if cautions else 0,
+    )

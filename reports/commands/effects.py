@@ -1,4 +1,5 @@
-"""`iapb effects SCENE`: list which effects a scene needs, why, and what leaving one out would change."""
+"""`iapb effects SCENE`: list which effects a scene needs, why, and what leaving one out would
+change."""
 
 from __future__ import annotations
 
@@ -18,13 +19,22 @@ from verification.table import titled
 
 def effects(
     scene: SceneName,
-    world: Annotated[str | None, typer.Option(
-        help="Decide for one world (ideal, ideal-friction, IAPB, PB, CBuc, IAPB-friction, IAPB-push); else an "
-             "effect is on if some world needs it.")] = None,
+    world: Annotated[
+        str | None,
+        typer.Option(
+            help="Decide for one world (ideal, ideal-friction, IAPB, PB, CBuc, IAPB-friction, IAPB-push); else an "
+            "effect is on if some world needs it."
+        ),
+    ] = None,
     rendering: Rendering = "full",
-    measure: Annotated[bool, typer.Option(
-        "--measure", help="Run the scene with and without each effect (in the world IAPB or PB): its cost per step, "
-        "and what changes without it. Takes seconds.")] = False,
+    measure: Annotated[
+        bool,
+        typer.Option(
+            "--measure",
+            help="Run the scene with and without each effect (in the world IAPB or PB): its cost per step, "
+            "and what changes without it. Takes seconds.",
+        ),
+    ] = False,
     json_: Json = False,
 ) -> Answer:
     """List every effect of SCENE: on or off, the reason, and what leaving it out would change."""
@@ -32,10 +42,16 @@ def effects(
     if measure:
         return _measured(source, world or "IAPB")
     chosen = find_world(world, rendering) if world else None
-    found = decide_effects(source, chosen.law, chosen.coupling_in(source)) if chosen else decide_effects(source)
+    found = (
+        decide_effects(source, chosen.law, chosen.coupling_in(source))
+        if chosen
+        else decide_effects(source)
+    )
     on, ignored = [effect for effect in found if effect.active], ignored_fields(found)
     said = f" ({world} ignores {', '.join(ignored)})" if ignored else ""
-    lines = [f"Effects of {source.name}{f' in {world}' if world else ''}: what is on, and what it prevents{said}"]
+    lines = [
+        f"Effects of {source.name}{f' in {world}' if world else ''}: what is on, and what it prevents{said}"
+    ]
     lines += [f"  {one.name:<20}{one.reason}\n{'':<22}without it: {one.left_out}" for one in on]
     lines += ["Off, because", *(f"  {one.name:<20}{one.reason}" for one in found if not one.active)]
     lines.append(f"{len(on)} of {len(found)} effects are on; the others cost nothing.")
@@ -43,19 +59,36 @@ def effects(
 
 
 def _measured(source: Any, world: str) -> Answer:
-    """Return the cost and the influence of each effect, and for which no other saves more time at no larger error."""
+    """Return the cost and the influence of each effect, and for which no other saves more time at
+    no larger error."""
     if world not in ("IAPB", "PB"):
-        raise ArgumentError("world", world, "IAPB or PB: --measure needs a world of the compiled engine")
+        raise ArgumentError(
+            "world", world, "IAPB or PB: --measure needs a world of the compiled engine"
+        )
     with stage_progress() as progress:
         progress("with and without each effect", 0, 1)
         table = effects_of(source, world)
     found = table.records()
-    best = {row["effect"]: row["best of its error"] for row in summary({source.name: table}).records()}
-    rows = [(one["effect"], "on" if one["active"] else "off", one["reason"], one["cost"],
-             (one["change"] or one["left out"]) if one["active"] else None, best.get(one["effect"])) for one in found]
+    best = {
+        row["effect"]: row["best of its error"] for row in summary({source.name: table}).records()
+    }
+    rows = [
+        (
+            one["effect"],
+            "on" if one["active"] else "off",
+            one["reason"],
+            one["cost"],
+            (one["change"] or one["left out"]) if one["active"] else None,
+            best.get(one["effect"]),
+        )
+        for one in found
+    ]
     shown = titled(("effect", "on", "why", "cost", "changes without it", "best of its error"), rows)
-    lines: list[Any] = [f"Effects of {source.name} in {world}, measured", shown,
-             "Best of its error: no other effect saves more time at the cost of no larger error."]
+    lines: list[Any] = [
+        f"Effects of {source.name} in {world}, measured",
+        shown,
+        "Best of its error: no other effect saves more time at the cost of no larger error.",
+    ]
     if idle := [one["effect"] for one in found if (one["change"] or "").startswith(NOTHING)]:
         lines.append(f"On, and change nothing in this run: {', '.join(idle)}.")
     return Answer({"scene": source.name, "world": world, "measured": found}, lines)

@@ -11,7 +11,16 @@ from typing import Annotated
 import typer
 
 from iapb.errors import ArgumentError
-from reports.difference import DIFFERS, PARTS, SHOWN, Difference, compare_reports, parts, sentences, unlike
+from reports.difference import (
+    DIFFERS,
+    PARTS,
+    SHOWN,
+    Difference,
+    compare_reports,
+    parts,
+    sentences,
+    unlike,
+)
 from reports.difference import lines as largest
 from reports.numbers_file import read_numbers
 from reports.show import Answer, Json
@@ -20,6 +29,7 @@ from verification.table import Table, titled
 
 class Action(StrEnum):
     """What to do."""
+
     diff = "diff"
 
 
@@ -27,24 +37,42 @@ def report(
     action: Annotated[Action, typer.Argument(help="diff: compare the numbers of two reports.")],
     old: Annotated[Path, typer.Argument(help="A report, its folder, or its numbers.json.")],
     new: Annotated[Path, typer.Argument(help="The other one.")],
-    tolerance: Annotated[float, typer.Option(min=0.0, help="Relative difference up to which numbers agree.")] = 1e-9,
+    tolerance: Annotated[
+        float, typer.Option(min=0.0, help="Relative difference up to which numbers agree.")
+    ] = 1e-9,
     json_: Json = False,
 ) -> Answer:
-    """Compare the numbers of two reports: equal, within a tolerance, or different; end with 1 if some differ."""
+    """Compare the numbers of two reports: equal, within a tolerance, or different; end with 1 if
+    some differ."""
     if not math.isfinite(tolerance):
         raise ArgumentError("--tolerance", tolerance, "a finite number, 0 or more")
     first, second = read_numbers(old), read_numbers(new)
     found = compare_reports(first, second, tolerance)
     reasons = unlike(first.provenance, second.provenance)
-    facts = {"differs_in": reasons, "depths": [first.depth, second.depth], "tolerance": tolerance,
-             "cells": Counter(cell.state for cell in found.cells), "differing": found.of(DIFFERS),
-             "tables_of_old_alone": found.tables_old, "tables_of_new_alone": found.tables_new,
-             "runs_same": found.runs_same, "runs_other": found.runs_other, "runs_single": found.runs_single}
-    lines: list[str | Table] = [f"The new report was made with another {', '.join(reasons)}." if reasons
-                                else "Same code, packages, processor and BLAS kernel."]  # fmt: skip
+    facts = {
+        "differs_in": reasons,
+        "depths": [first.depth, second.depth],
+        "tolerance": tolerance,
+        "cells": Counter(cell.state for cell in found.cells),
+        "differing": found.of(DIFFERS),
+        "tables_of_old_alone": found.tables_old,
+        "tables_of_new_alone": found.tables_new,
+        "runs_same": found.runs_same,
+        "runs_other": found.runs_other,
+        "runs_single": found.runs_single,
+    }
+    lines: list[str | Table] = [
+        f"The new report was made with another {', '.join(reasons)}."
+        if reasons
+        else "Same code, packages, processor and BLAS kernel."
+    ]
     if first.depth != second.depth:
-        lines.append(f"The old report is {first.depth}, the new one {second.depth}: many numbers are of one only.")
-    return Answer(facts, [*lines, *difference_lines(found, tolerance)], 1 if found.count(DIFFERS) else 0)
+        lines.append(
+            f"The old report is {first.depth}, the new one {second.depth}: many numbers are of one only."
+        )
+    return Answer(
+        facts, [*lines, *difference_lines(found, tolerance)], 1 if found.count(DIFFERS) else 0
+    )
 
 
 def difference_lines(found: Difference, tolerance: float) -> list[str | Table]:
@@ -52,5 +80,10 @@ def difference_lines(found: Difference, tolerance: float) -> list[str | Table]:
     by_part = titled(("part", *(name for name, _ in PARTS)), parts(found))
     count = found.count(DIFFERS)
     listed = [f"The largest {min(count, SHOWN)} of {count} differences:"] if count else []
-    return ["Table and words by part of the report", by_part, *listed, *(f"  {line}" for line in largest(found)),
-            *sentences(found, tolerance)]
+    return [
+        "Table and words by part of the report",
+        by_part,
+        *listed,
+        *(f"  {line}" for line in largest(found)),
+        *sentences(found, tolerance),
+    ]

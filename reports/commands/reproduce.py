@@ -34,17 +34,30 @@ SHOWN_FAILURES = 20  # of a stage, in the last lines
 
 
 def reproduce(
-    out: Annotated[Path | None, typer.Option(
-        help="Folder of the report, the runs and the tables; default out, with --check a temporary one.")] = None,
-    full: Annotated[bool, typer.Option("--full", help="The deep version: finer conditions, ten times the impacts.")]
-    = False,
-    figure: Annotated[str | None, typer.Option(help="Write one figure's drawings only (such as fig07) as SVG.")] = None,
-    check: Annotated[Path | None, typer.Option(
-        help="Recompute everything and compare all numbers with this report.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder of the report, the runs and the tables; default out, with --check a temporary one."
+        ),
+    ] = None,
+    full: Annotated[
+        bool,
+        typer.Option("--full", help="The deep version: finer conditions, ten times the impacts."),
+    ] = False,
+    figure: Annotated[
+        str | None, typer.Option(help="Write one figure's drawings only (such as fig07) as SVG.")
+    ] = None,
+    check: Annotated[
+        Path | None,
+        typer.Option(help="Recompute everything and compare all numbers with this report."),
+    ] = None,
     json_: Json = False,
 ) -> Answer:
     """Regenerate the report; cached results are reused."""
-    for package in ("matplotlib", "latex2mathml"):  # if one is missing, say it before minutes of computing
+    for package in (
+        "matplotlib",
+        "latex2mathml",
+    ):  # if one is missing, say it before minutes of computing
         needed(package, "iapb reproduce")
     depth, folder = "full" if full else "quick", out or Path("out")
     if check is not None:
@@ -53,9 +66,11 @@ def reproduce(
 
 
 def make_report(out: Path, depth: str) -> Answer:
-    """Compute all evidence or read stored results, write the report and its companion files, return the verdicts.
+    """Compute all evidence or read stored results, write the report and its companion files, return
+    the verdicts.
 
-    If nothing that the report is made from has changed since the last call, its answer is given again.
+    If nothing that the report is made from has changed since the last call, its answer is given
+    again.
     """
     started, key = time.perf_counter(), report_key(out, depth)
     if (kept := kept_answer(out, key)) is not None:
@@ -73,18 +88,35 @@ def make_report(out: Path, depth: str) -> Answer:
     took = {**evidence.seconds, "figures and page": ended - gathered}
     counts = count_claims(evidence.claims)
     lines = [
-        *([f"Of {len(evidence.claims)} claims of the paper "
-           f"{'; '.join(f'{count} {words}' for count, words in counts.values())}."] if counts else []),
+        *(
+            [
+                f"Of {len(evidence.claims)} claims of the paper "
+                f"{'; '.join(f'{count} {words}' for count, words in counts.values())}."
+            ]
+            if counts
+            else []
+        ),
         *(f"{topic.title}: {topic.answer}" for topic in evidence.topics),
         f"\n{path} ({path.stat().st_size / 1e6:.1f} MB, from {len(evidence.runs)} runs) in {ended - started:.0f} s.",
         f"Beside it: {', '.join(file.name for file in beside)}.",
         f"Seconds by part: {', '.join(f'{part} {seconds:.0f}' for part, seconds in took.items())}.",
         *_failure_lines(failed),
     ]
-    answers = {topic.title: {"verdict": topic.verdict, "answer": topic.answer} for topic in evidence.topics}
-    claims = {claim.key: {"outcome": claim.outcome, "answer": claim.answer} for claim in evidence.claims}
-    facts = {"page": path, "claims": claims, "beside": beside, "runs": len(evidence.runs), "seconds": took,
-             "answers": answers, "failed": failed}
+    answers = {
+        topic.title: {"verdict": topic.verdict, "answer": topic.answer} for topic in evidence.topics
+    }
+    claims = {
+        claim.key: {"outcome": claim.outcome, "answer": claim.answer} for claim in evidence.claims
+    }
+    facts = {
+        "page": path,
+        "claims": claims,
+        "beside": beside,
+        "runs": len(evidence.runs),
+        "seconds": took,
+        "answers": answers,
+        "failed": failed,
+    }
     if failed:
         return Answer(facts, lines, 1)
     tables = [path.relative_to(out).as_posix() for path in (out / "tables").glob("*.h5")]
@@ -105,14 +137,18 @@ def _failure_lines(failed: Sequence[FailedCases]) -> Iterator[str]:
 
 
 def check_report(report: Path, out: Path | None) -> Answer:
-    """Compute everything again, at the report's depth, into `out` or a temporary folder, and compare.
+    """Compute everything again, at the report's depth, into `out` or a temporary folder, and
+    compare.
 
-    With the same code, packages, processor and BLAS kernel, runs must agree to the last bit; otherwise numbers must
-    agree within the tolerance. Ends with 1 if they do not, or if numbers of the report were not computed again.
+    With the same code, packages, processor and BLAS kernel, runs must agree to the last bit;
+    otherwise numbers must agree within the tolerance. Ends with 1 if they do not, or if numbers of
+    the report were not computed again.
     """
     given = read_numbers(report)
     if out is not None and out.exists() and any(out.iterdir()):
-        raise ArgumentError("--out", str(out), "an empty folder: results in it would be reused, not computed again")
+        raise ArgumentError(
+            "--out", str(out), "an empty folder: results in it would be reused, not computed again"
+        )
     with tempfile.TemporaryDirectory() if out is None else nullcontext(str(out)) as folder:
         answer = make_report(Path(folder), given.depth)
         if answer.status:
@@ -121,17 +157,34 @@ def check_report(report: Path, out: Path | None) -> Answer:
     found, reasons = compare_reports(given, made), unlike(given.provenance, made.provenance)
     lost = found.count(ONLY_OLD) + len(found.tables_old)
     failed = found.count(DIFFERS) + lost + (0 if reasons else len(found.runs_other))
-    like = (f"The report was made with another {', '.join(reasons)}: numbers must agree within {TOLERANCE:.0e}."
-            if reasons else "Same code, packages, processor and BLAS kernel: runs must agree to the last bit.")
+    like = (
+        f"The report was made with another {', '.join(reasons)}: numbers must agree within {TOLERANCE:.0e}."
+        if reasons
+        else "Same code, packages, processor and BLAS kernel: runs must agree to the last bit."
+    )
     return Answer(
-        answer.facts | {"differs_in": reasons, "tolerance": TOLERANCE, "differing": found.of(DIFFERS),
-                        "not_made_again": lost, "runs_other": found.runs_other, "made_again": not failed},
-        [*answer.lines, f"\n{like}", *difference_lines(found, TOLERANCE),
-         f"{report}: {'not every' if failed else 'every'} number was made again."], int(bool(failed)))
+        answer.facts
+        | {
+            "differs_in": reasons,
+            "tolerance": TOLERANCE,
+            "differing": found.of(DIFFERS),
+            "not_made_again": lost,
+            "runs_other": found.runs_other,
+            "made_again": not failed,
+        },
+        [
+            *answer.lines,
+            f"\n{like}",
+            *difference_lines(found, TOLERANCE),
+            f"{report}: {'not every' if failed else 'every'} number was made again.",
+        ],
+        int(bool(failed)),
+    )
 
 
 def _write_figure(key: str, out: Path, depth: str) -> Answer:
-    """Write each panel of a figure, and all panels with the legend in one file; compute only the needed inputs."""
+    """Write each panel of a figure, and all panels with the legend in one file; compute only the
+    needed inputs."""
     recipes = {recipe.key: recipe for recipe in RECIPES}
     if key not in recipes:
         raise ArgumentError("--figure", key, one_of(key, recipes))
@@ -139,21 +192,33 @@ def _write_figure(key: str, out: Path, depth: str) -> Answer:
         inputs, failed = _inputs(recipes[key].needs, out, depth, progress)
     drawn = draw(recipes[key], inputs)
     if not drawn.panels:
-        raise ArgumentError("--figure", key, f"a figure whose inputs exist; missing: {', '.join(drawn.missing)}")
-    pictures = {f"{key}-{number}.{'html' if panel.is_table else 'svg'}": (panel.svg, panel.label)
-                for number, panel in enumerate(drawn.panels)}  # fmt: skip
+        raise ArgumentError(
+            "--figure", key, f"a figure whose inputs exist; missing: {', '.join(drawn.missing)}"
+        )
+    pictures = {
+        f"{key}-{number}.{'html' if panel.is_table else 'svg'}": (panel.svg, panel.label)
+        for number, panel in enumerate(drawn.panels)
+    }
     whole = f"{key}.{'html' if any(panel.is_table for panel in drawn.panels) else 'svg'}"
-    written = {out / name: drawing for name, drawing in {**pictures, whole: (standalone(drawn), "all of it")}.items()}
+    written = {
+        out / name: drawing
+        for name, drawing in {**pictures, whole: (standalone(drawn), "all of it")}.items()
+    }
     for path, (text, _) in written.items():
         write_whole(path, text)
     lines = [f"{path}: {label or drawn.title}" for path, (_, label) in written.items()]
-    return Answer({"drawings": [out / name for name in pictures], "failed": failed}, [*lines, *_failure_lines(failed)],
-                  int(bool(failed)))
+    return Answer(
+        {"drawings": [out / name for name in pictures], "failed": failed},
+        [*lines, *_failure_lines(failed)],
+        int(bool(failed)),
+    )
 
 
-def _inputs(needs: tuple[str, ...], out: Path, depth: str,
-            progress: Any) -> tuple[Mapping[str, Any], tuple[FailedCases, ...]]:  # fmt: skip
-    """Return the inputs of a figure and the failed cases. If runs and scenes do not suffice, compute all evidence."""
+def _inputs(
+    needs: tuple[str, ...], out: Path, depth: str, progress: Any
+) -> tuple[Mapping[str, Any], tuple[FailedCases, ...]]:
+    """Return the inputs of a figure and the failed cases. If runs and scenes do not suffice,
+    compute all evidence."""
     if not all(name in (*FIGURE_RUNS, TILTED) or name.startswith("scene/") for name in needs):
         evidence = gather(out, depth, progress)
         return figure_inputs(evidence), evidence.failed

@@ -23,13 +23,28 @@ from reports.show import Answer, Json, counted, duration, one_line, stage_progre
 from reports.store.io import blocks
 from reports.uses import parsed
 
-SceneName = Annotated[str, typer.Argument(
-    help="A scene file, or the name of a scene that comes with the project: see iapb scenes.",
-    autocompletion=lambda incomplete: [name for name in scene_names() if name.startswith(incomplete)])]  # fmt: skip
-Rendering = Annotated[str, typer.Option(
-    help="How impulses meet the device's limits: full, saturate, scale or spread (IAPB only).")]  # fmt: skip
-Values = Annotated[list[str] | None, typer.Option(
-    "--set", help="Change a value: contact.friction=0.3, bodies.peg.position=[0.03,-0.01,0]. Repeatable.")]  # fmt: skip
+SceneName = Annotated[
+    str,
+    typer.Argument(
+        help="A scene file, or the name of a scene that comes with the project: see iapb scenes.",
+        autocompletion=lambda incomplete: [
+            name for name in scene_names() if name.startswith(incomplete)
+        ],
+    ),
+]
+Rendering = Annotated[
+    str,
+    typer.Option(
+        help="How impulses meet the device's limits: full, saturate, scale or spread (IAPB only)."
+    ),
+]
+Values = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        help="Change a value: contact.friction=0.3, bodies.peg.position=[0.03,-0.01,0]. Repeatable.",
+    ),
+]
 WORTH_SAYING = 60.0  # [s] expected computing time
 DISTRUSTED = 3  # exit status of a run whose result is not to be trusted
 SHOWN_COORDINATES = 12  # more would not fit into a readable line
@@ -43,12 +58,19 @@ def scene_given(name: str, values: list[str] | None) -> Scene:
 
 def run(
     scene: SceneName,
-    world: Annotated[str, typer.Option(help="ideal, IAPB, PB or CBuc (paper, section VI); ideal-friction: with "
-                                            "Coulomb friction; IAPB-friction: with Coulomb friction in impacts; "
-                                            "IAPB-push: contacts only push.")] = "IAPB",
+    world: Annotated[
+        str,
+        typer.Option(
+            help="ideal, IAPB, PB or CBuc (paper, section VI); ideal-friction: with "
+            "Coulomb friction; IAPB-friction: with Coulomb friction in impacts; "
+            "IAPB-push: contacts only push."
+        ),
+    ] = "IAPB",
     rendering: Rendering = "full",
     set_: Values = None,
-    every: Annotated[int, typer.Option(min=1, help="Record every N-th step only; a long run takes less memory.")] = 1,
+    every: Annotated[
+        int, typer.Option(min=1, help="Record every N-th step only; a long run takes less memory.")
+    ] = 1,
     out: Annotated[Path, typer.Option(help="Folder of the run files.")] = Path("out/runs"),
     json_: Json = False,
 ) -> Answer:
@@ -76,13 +98,16 @@ def run(
         lines.append(f"Stored in {one_line(file)}")
         status = DISTRUSTED if result.distrust else 0
     else:
-        lines.append(f"Stopped: {result.stopped}. The {result.steps_done} steps done are readable in {one_line(file)}")
+        lines.append(
+            f"Stopped: {result.stopped}. The {result.steps_done} steps done are readable in {one_line(file)}"
+        )
         status = 130 if result.stopped == INTERRUPTED else 1
     return Answer(run_as_json(result) | {"warnings": cautions, "file": file}, lines, status)
 
 
 def cost_in_words(scene: Scene, law: Any) -> tuple[str, bool]:
-    """Return a warning if a rigid world will take long, and whether it refuses the scene; "" for other laws."""
+    """Return a warning if a rigid world will take long, and whether it refuses the scene; "" for
+    other laws."""
     if not hasattr(law, "cost"):
         return "", False
     cost = law.cost(System(scene))
@@ -91,20 +116,31 @@ def cost_in_words(scene: Scene, law: Any) -> tuple[str, bool]:
         return f"{rows}: more than the rigid worlds take; fewer bodies, or the world IAPB", True
     if cost.seconds * scene.steps < WORTH_SAYING:
         return "", False
-    return f"{rows}, about {duration(cost.seconds)} a step and {duration(cost.seconds * scene.steps)} in all", False
+    return (
+        f"{rows}, about {duration(cost.seconds)} a step and {duration(cost.seconds * scene.steps)} in all",
+        False,
+    )
 
 
 def run_as_json(run: Run) -> dict[str, Any]:
     """Return the summary of a run as plain values."""
     return {
-        "scene": run.scene_name, "world": run.world, "law": run.law, "coupling": run.coupling,
-        "steps": run.steps_done, "every": run.every, "dt": run.dt,
-        "complete": run.complete, "stopped": run.stopped,
+        "scene": run.scene_name,
+        "world": run.world,
+        "law": run.law,
+        "coupling": run.coupling,
+        "steps": run.steps_done,
+        "every": run.every,
+        "dt": run.dt,
+        "complete": run.complete,
+        "stopped": run.stopped,
         "collisions": len(run.impacts.step) if run.records_contacts else None,
         "deepest_penetration": deepest(run) if run.records_contacts else None,
         "end": dict(zip(run.coordinate_names, run.q[-1].tolist(), strict=True)),
-        "ignores": ignored_fields(run.effects), "remarks": run.remarks, "distrust": run.distrust,
-    }  # fmt: skip
+        "ignores": ignored_fields(run.effects),
+        "remarks": run.remarks,
+        "distrust": run.distrust,
+    }
 
 
 def deepest(run: Run) -> float:
@@ -114,28 +150,44 @@ def deepest(run: Run) -> float:
 
 def describe(run: Run, existed: bool) -> Iterator[str]:
     """Yield a summary of a run in sentences; the arrays may be in memory or in the run's file."""
-    seconds, impacts, ignored = float(np.sum(run.chunk_seconds)), run.impacts, ignored_fields(run.effects)
+    seconds, impacts, ignored = (
+        float(np.sum(run.chunk_seconds)),
+        run.impacts,
+        ignored_fields(run.effects),
+    )
     said = f"; ignores {', '.join(ignored)}" if ignored else ""
     yield f"{run.scene_name} in the world {run.world}: {run.law}, coupling {run.coupling}{said}."
     how = "read from its file; it had taken" if existed else "computed in"
-    yield (f"{run.steps_done} steps of {run.dt * 1e3:.4g} ms, {how} {duration(seconds)} "
-           f"({duration(seconds / max(run.steps_done, 1))} a step).")
+    yield (
+        f"{run.steps_done} steps of {run.dt * 1e3:.4g} ms, {how} {duration(seconds)} "
+        f"({duration(seconds / max(run.steps_done, 1))} a step)."
+    )
     if run.every > 1:
         yield f"Recorded are {run.steps} of them: one of {run.every}, and those with an impact."
     if len(impacts.step):
         lost = sum(float(np.sum(block)) for block in blocks(impacts.energy_lost))
         most = max(int(block.max()) for block in blocks(impacts.rows))
-        yield (f"{counted(len(impacts.step), 'impact')}, the first at {run.time[impacts.step[0]]:.4f} s, up to "
-              f"{counted(most, 'contact')} at once; {lost:.4g} J were lost in them.")
+        yield (
+            f"{counted(len(impacts.step), 'impact')}, the first at "
+            f"{run.time[impacts.step[0]]:.4f} s, up to "
+            f"{counted(most, 'contact')} at once; {lost:.4g} J were lost in them."
+        )
     elif run.records_contacts:
         yield "No contact got an impulse."
     if len(run.contacts.gap):
         yield f"Deepest penetration {deepest(run) * 1e3:.4g} mm."
     count, tool = len(run.coordinate_names), range(*run.tool_coordinates)
     shown = range(count) if count <= SHOWN_COORDINATES else tool or range(SHOWN_COORDINATES)
-    more = f" (and {count - len(shown)} more coordinates in the run's file)" if count > len(shown) else ""
+    more = (
+        f" (and {count - len(shown)} more coordinates in the run's file)"
+        if count > len(shown)
+        else ""
+    )
     yield f"At the end: {', '.join(f'{run.coordinate_names[i]} {run.q[-1, i]:.6g}' for i in shown)}{more}."
-    yield from (f"{remark}." for remark in run.remarks
-                if not ("stiffness" in ignored and remark.startswith("chosen for implicit contact")))
+    yield from (
+        f"{remark}."
+        for remark in run.remarks
+        if not ("stiffness" in ignored and remark.startswith("chosen for implicit contact"))
+    )
     if run.distrust:
         yield f"This result is not to be trusted, because {'; '.join(run.distrust)}."

@@ -20,6 +20,7 @@ from reports.store.runs import read_provenance
 
 class Action(StrEnum):
     """The action on a folder of results."""
+
     check = "check"
     again = "again"
 
@@ -29,7 +30,9 @@ _ACTION = "check: read every file whole. again: simulate runs again and compare 
 
 def store(
     action: Annotated[Action, typer.Argument(help=_ACTION)],
-    where: Annotated[Path, typer.Argument(help="A folder of results, or one run file.")] = Path("out"),
+    where: Annotated[Path, typer.Argument(help="A folder of results, or one run file.")] = Path(
+        "out"
+    ),
     json_: Json = False,
 ) -> Answer:
     """Check the run and table files below a folder, or simulate its runs again."""
@@ -45,7 +48,11 @@ def _checked(where: Path) -> Answer:
     with stage_progress() as progress:
         states = check_store(where, partial(progress, "files read whole"))
     count = Counter(state.state for state in states)
-    lines = [f"{one_line(state.path)}: {state.state}: {state.why}" for state in states if state.state != WHOLE]
+    lines = [
+        f"{one_line(state.path)}: {state.state}: {state.why}"
+        for state in states
+        if state.state != WHOLE
+    ]
     parts = ", ".join(f"{number} {state}" for state, number in count.most_common())
     lines.append(f"{len(states)} files: {parts or 'none'}")
     if count[DAMAGED]:
@@ -56,7 +63,11 @@ def _checked(where: Path) -> Answer:
 
 def _again(where: Path) -> Answer:
     """Simulate the runs again; list what differs, and by how much."""
-    files = [path for path in sorted(where.rglob("*.h5")) if is_run(path)] if where.is_dir() else [where]
+    files = (
+        [path for path in sorted(where.rglob("*.h5")) if is_run(path)]
+        if where.is_dir()
+        else [where]
+    )
     facts, lines = dict[Path, dict[str, object]](), list[str]()
     with stage_progress() as progress:
         for done, path in enumerate(files):
@@ -68,11 +79,16 @@ def _again(where: Path) -> Answer:
                 lines.append(f"{one_line(path)}: {facts[path]['failed']}")
                 continue
             facts[path] = {"same": found.same, "differs": found.differs}
-            lines.append(f"{one_line(path)}: {'the same to the last bit' if found.same else 'differs in'}")
+            lines.append(
+                f"{one_line(path)}: {'the same to the last bit' if found.same else 'differs in'}"
+            )
             lines += [f"  {one.name}: {one.how}" for one in found.differs]
             made, here = read_provenance(path).get("blas", "unknown"), linear_algebra()
             if not found.same and made != here:
                 lines.append(f"  it was stored under {made}; this is {here}")
     same = sum(bool(one.get("same")) for one in facts.values())
-    return Answer({"same": same, "files": facts}, [*lines, f"{same} of {len(files)} runs came out the same."],
-                  int(same < len(files)))
+    return Answer(
+        {"same": same, "files": facts},
+        [*lines, f"{same} of {len(files)} runs came out the same."],
+        int(same < len(files)),
+    )

@@ -1,4 +1,5 @@
-"""The external folders and packages that each stage reads; their hashes and versions are part of the stage's key."""
+"""The external folders and packages that each stage reads; their hashes and versions are part of
+the stage's key."""
 
 from __future__ import annotations
 
@@ -23,14 +24,25 @@ PACKAGES: dict[str, tuple[str, ...]] = {
     "engines": ("mujoco",),
     "mechanics": ("pin", "coal"),
     "accuracy": ("daqp", "quantecon"),
-    "complementarity": ("cvxpy", "clarabel", "osqp", "scs", "qpsolvers", "daqp", "quadprog", "proxsuite", "quantecon",
-                        "pin"),
+    "complementarity": (
+        "cvxpy",
+        "clarabel",
+        "osqp",
+        "scs",
+        "qpsolvers",
+        "daqp",
+        "quadprog",
+        "proxsuite",
+        "quantecon",
+        "pin",
+    ),
     "haptic-rate": ("mujoco", "pin", "daqp", "quadprog", "proxsuite", "quantecon"),
 }
 
 
 def depends_of(stage: str) -> dict[str, str]:
-    """Return the external dependencies of a stage by name: hashes of folders (or ABSENT) and package versions.
+    """Return the external dependencies of a stage by name: hashes of folders (or ABSENT) and
+    package versions.
 
     Those of a part of a topic, such as "complementarity, without times", are the topic's.
     """
@@ -42,10 +54,13 @@ def depends_of(stage: str) -> dict[str, str]:
 
 
 def folder_hash(folder: Path) -> str:
-    """Return sha256 of the names and bytes of every file below a folder; ABSENT where there is no such folder."""
+    """Return sha256 of the names and bytes of every file below a folder; ABSENT where there is no
+    such folder."""
     if not folder.is_dir():
         return ABSENT
     digest = hashlib.sha256()
     for path in sorted(path for path in folder.rglob("*") if path.is_file()):
-        digest.update(path.relative_to(folder).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
+        digest.update(
+            path.relative_to(folder).as_posix().encode() + b"\0" + path.read_bytes() + b"\0"
+        )
     return digest.hexdigest()

@@ -43,32 +43,54 @@ Progress = Callable[[str, int, int], None]
 
 # study that draws random numbers -> module with its SEED
 SEEDS = {
-    "claims": "verification.check", "properties": "verification.laws.topic",
-    "proofs": "verification.proofs.numbers", "robots": "verification.mechanics.against_pinocchio",
+    "claims": "verification.check",
+    "properties": "verification.laws.topic",
+    "proofs": "verification.proofs.numbers",
+    "robots": "verification.mechanics.against_pinocchio",
     "mass matrices": "verification.mechanics.definiteness",
-}  # fmt: skip
-SHOWN_SCENES = ("peg_corner", "peg_hole", "wall_1d", "two_link_arm_a", "two_link_arm_b", "arm_pushing")
+}
+SHOWN_SCENES = (
+    "peg_corner",
+    "peg_hole",
+    "wall_1d",
+    "two_link_arm_a",
+    "two_link_arm_b",
+    "arm_pushing",
+)
 FIGURE_RUNS = "runs of the figures"
 CERTIFIED = "exact-energy"  # the stage that needs all runs of the others
-# The first stages to be computed: one worker compiles the engine for the figures' runs, while the other needs no engine
-# for proofs and the slowest runs. The stages after them are shorter.
+# The first stages to be computed: one worker compiles the engine for the figures' runs, while the
+# other needs no engine for proofs and the slowest runs. The stages after them are shorter.
 ON_THE_PEG = "claims on the peg"
 FIRST = ("proofs", ON_THE_PEG, "properties", "claims")
-COMPILED_AHEAD = (C19, C22, ACCURACY, RACES, SCALING, BODIES, IMPACT_TIMES)  # checks whose kernels only they call
+COMPILED_AHEAD = (
+    C19,
+    C22,
+    ACCURACY,
+    RACES,
+    SCALING,
+    BODIES,
+    IMPACT_TIMES,
+)  # checks whose kernels only they call
 BESIDE = "parts that measure no time"
 
 
 def gather(out: Path, depth: str, progress: Progress) -> Evidence:
     """Compute or read everything that the report shows; runs/ and tables/ are written in `out`.
 
-    First the stages that measure no time are computed beside each other, in processes; then all others, one after the
-    other, in this process.
+    First the stages that measure no time are computed beside each other, in processes; then all
+    others, one after the other, in this process.
     """
     runner = Runner(out / "runs")
-    stages = {name: Stage(out / "tables", name, plan.kind, depth, depends_of(name)) for name, plan in plans().items()}
+    stages = {
+        name: Stage(out / "tables", name, plan.kind, depth, depends_of(name))
+        for name, plan in plans().items()
+    }
     _compute_beside(stages, out, depth, progress)
     lost: list[Failure] = []
-    read = attempt("all of it", partial(runs.figure_runs, runner, partial(progress, FIGURE_RUNS), lost), lost)
+    read = attempt(
+        "all of it", partial(runs.figure_runs, runner, partial(progress, FIGURE_RUNS), lost), lost
+    )
     tilted = attempt(runs.TILTED, partial(runs.tilted_runs, runner), lost)
     for stage in stages.values():
         ahead, fresh = stages.get(stage.name + AHEAD), not stage.path.is_file()
@@ -78,32 +100,68 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
 
     def finding(name: str, said: Callable[..., Finding]) -> Finding:
         stage = stages[name]
-        return said(stage.records or (), stage.failures) if stage.records or not stage.failures else _failed(stage)
+        return (
+            said(stage.records or (), stage.failures)
+            if stage.records or not stage.failures
+            else _failed(stage)
+        )
 
-    ledger = tuple(sorted((claim for name in CLAIM_STAGES for claim in stages[name].records or ()),
-                          key=lambda claim: claim.key))  # fmt: skip
+    ledger = tuple(
+        sorted(
+            (claim for name in CLAIM_STAGES for claim in stages[name].records or ()),
+            key=lambda claim: claim.key,
+        )
+    )
     gains, properties, *others = (stages[name].records or _failed(stages[name]) for name in TOPICS)
-    topics = [gains, finding("proofs", partial(on_proofs, development=checked.read())),
-              properties, finding("hard cases", on_hard_cases), *others]  # fmt: skip
-    topics = [haptic_rate.quoting(topic, (*ledger, *topics)) if topic.key == haptic_rate.TOPIC.key else topic
-              for topic in topics]  # fmt: skip
-    topics = [_failed(stages[name]) for name in CLAIM_STAGES
-              if stages[name].records is None] + topics  # fmt: skip
-    scenes, facts = {name: runs.shipped_scene(name).resolved() for name in SHOWN_SCENES}, provenance()
+    topics = [
+        gains,
+        finding("proofs", partial(on_proofs, development=checked.read())),
+        properties,
+        finding("hard cases", on_hard_cases),
+        *others,
+    ]
+    topics = [
+        haptic_rate.quoting(topic, (*ledger, *topics))
+        if topic.key == haptic_rate.TOPIC.key
+        else topic
+        for topic in topics
+    ]
+    topics = [
+        _failed(stages[name]) for name in CLAIM_STAGES if stages[name].records is None
+    ] + topics
+    scenes, facts = (
+        {name: runs.shipped_scene(name).resolved() for name in SHOWN_SCENES},
+        provenance(),
+    )
     needed = stages["effects"].records or {}
     shown = {name: needed[name] for name in effects.SCENES if name in needed}
-    inputs = {**(read or {}), **{f"scene/{name}": scene for name, scene in scenes.items()},
-              runs.TILTED: tilted, "arm_energies": arm_energies(), "work_precision": stages["accuracy"].records,
-              "effect_costs": effects.summary(shown), "effect_steps": effects.steps(needed),
-              "machine": "{cpu}, report of {date}".format_map(facts)}  # fmt: skip
-    failed = failed_cases(out / "tables", {FIGURE_RUNS: lost} | {one.name: one.failures for one in stages.values()})
+    inputs = {
+        **(read or {}),
+        **{f"scene/{name}": scene for name, scene in scenes.items()},
+        runs.TILTED: tilted,
+        "arm_energies": arm_energies(),
+        "work_precision": stages["accuracy"].records,
+        "effect_costs": effects.summary(shown),
+        "effect_steps": effects.steps(needed),
+        "machine": "{cpu}, report of {date}".format_map(facts),
+    }
+    failed = failed_cases(
+        out / "tables", {FIGURE_RUNS: lost} | {one.name: one.failures for one in stages.values()}
+    )
     return Evidence(
-        inputs=inputs, scenes=scenes, claims=ledger, proofs=stages["proofs"].records or (),
-        counterexamples=stages["counterexamples"].records or (), hard_cases=stages["hard cases"].records or (),
-        effects=shown, topics=tuple(topics), failed=failed, provenance=facts,
+        inputs=inputs,
+        scenes=scenes,
+        claims=ledger,
+        proofs=stages["proofs"].records or (),
+        counterexamples=stages["counterexamples"].records or (),
+        hard_cases=stages["hard cases"].records or (),
+        effects=shown,
+        topics=tuple(topics),
+        failed=failed,
+        provenance=facts,
         runs=tuple(runner.used.values()),
         seconds={stage.name: stage.seconds for stage in stages.values()},
-    )  # fmt: skip
+    )
 
 
 def _failed(stage: Stage) -> Finding:
@@ -111,8 +169,11 @@ def _failed(stage: Stage) -> Finding:
 
 
 @one_thread()
-def _fill(stage: Stage, runner: Runner, depth: str, progress: Progress, ahead: Stage | None = None) -> Stage:
-    """Read or compute the records of a stage, unless it has been done; `ahead` has tables of its checks."""
+def _fill(
+    stage: Stage, runner: Runner, depth: str, progress: Progress, ahead: Stage | None = None
+) -> Stage:
+    """Read or compute the records of a stage, unless it has been done; `ahead` has tables of its
+    checks."""
     plan, said = plans()[stage.name], partial(progress, stage.name)
     known = {"known": ahead.records} if ahead is not None and not ahead.failures else {}
     if stage.records is None and not stage.failures:
@@ -124,9 +185,11 @@ def _fill(stage: Stage, runner: Runner, depth: str, progress: Progress, ahead: S
 
 
 def _compute_beside(stages: dict[str, Stage], out: Path, depth: str, progress: Progress) -> None:
-    """Compute the missing stages that measure no time, each in a process, and put them into `stages`.
+    """Compute the missing stages that measure no time, each in a process, and put them into
+    `stages`.
 
-    If a worker is killed because memory ran out, its stage stays missing; it is computed alone after that.
+    If a worker is killed because memory ran out, its stage stays missing; it is computed alone
+    after that.
     """
     order = sorted(stages, key=lambda name: FIRST.index(name) if name in FIRST else len(FIRST))
     missing = [name for name in order if not stages[name].path.is_file()]
@@ -153,12 +216,14 @@ def silent(*_: Any) -> None:
 
 
 def _figure_runs(out: Path) -> None:
-    """Simulate the runs of the figures, in a worker; the parent reads them, and tries again those that fail."""
+    """Simulate the runs of the figures, in a worker; the parent reads them, and tries again those
+    that fail."""
     runs.figure_runs(Runner(out / "runs"), silent, [])
 
 
 def _compile_ahead(out: Path, depth: str) -> None:
-    """Compute one case of checks that measure times, in a worker, and drop it: later their kernels are compiled."""
+    """Compute one case of checks that measure times, in a worker, and drop it: later their kernels
+    are compiled."""
     study = Study(Runner(out / "runs"), depth)
     attempt("", judge.warm_up, [])
     for check in COMPILED_AHEAD:
@@ -171,18 +236,24 @@ def _slowest_runs(out: Path, depth: str) -> None:
     for scene, world in peg.slowest_runs(Study(runner, depth)):
         if (out / "runs" / runner.file_of(scene, world)).is_file():
             return
-        attempt("", partial(runner, scene, world, keep=False), [])  # the claim that needs it will name the failure
+        attempt(
+            "", partial(runner, scene, world, keep=False), []
+        )  # the claim that needs it will name the failure
 
 
 def provenance() -> dict[str, str]:
-    """Return the provenance of the report: date, machine and versions, all seeds, sources, and compared packages."""
+    """Return the provenance of the report: date, machine and versions, all seeds, sources, and
+    compared packages."""
     seeds = [f"{name} {import_module(module).SEED}" for name, module in SEEDS.items()]
     facts = collect_provenance(seeds=seeds, packages=PEERS)
     return {"date": datetime.now(UTC).date().isoformat()} | facts | {"sources": evidence_version()}
 
 
-def failed_cases(folder: Path, failures: Mapping[str, Sequence[Failure]]) -> tuple[FailedCases, ...]:
-    """Return the failed cases of each stage; write their tracebacks to a file in `folder`, or remove an older file."""
+def failed_cases(
+    folder: Path, failures: Mapping[str, Sequence[Failure]]
+) -> tuple[FailedCases, ...]:
+    """Return the failed cases of each stage; write their tracebacks to a file in `folder`, or
+    remove an older file."""
     found = []
     for name, lost in failures.items():
         path = folder / f"{name.replace(' ', '_')}-failed.txt"

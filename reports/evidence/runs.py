@@ -13,8 +13,9 @@ from reports.runner import Runner
 from verification.claims.conditions import IGNORED, TILTS, Condition
 from verification.finding import Failure, attempt, counted
 
-# Emulation of the experiments in the paper's section VII: the device runs at 512 Hz with a delay of one step in each
-# direction, encoders of 1 µm and 0.01 mrad, and low bearing friction. These numbers are ours: the paper gives none.
+# Emulation of the experiments in the paper's section VII: the device runs at 512 Hz with a delay of
+# one step in each direction, encoders of 1 µm and 0.01 mrad, and low bearing friction. These
+# numbers are ours: the paper gives none.
 EMULATED_DEVICE: dict[str, Any] = {
     "device.delay": 1,
     "device.position_resolution": [1e-6, 1e-6, 1e-5],
@@ -34,9 +35,15 @@ FIGURE_RUNS: dict[str, tuple[str, dict[str, Any], str, str]] = {
     "device/IAPB-LM": ("peg_corner", EMULATED_DEVICE, "IAPB", "spread"),
     "device/PB": ("peg_corner", EMULATED_DEVICE, "PB", "full"),
     "group/IAPB": ("arm_pushing", {}, "IAPB", "full"),
-    **{f"wall/{world}": (  # 2,000 times stiffer than Colgate's passivity bound: the hard case
-        "wall_1d", {"contact.stiffness": 1.024e6, "contact.damping": 0.0, "duration": 3.0}, world, "full")
-       for world in ("ideal", "IAPB", "PB")},
+    **{
+        f"wall/{world}": (  # 2,000 times stiffer than Colgate's passivity bound: the hard case
+            "wall_1d",
+            {"contact.stiffness": 1.024e6, "contact.damping": 0.0, "duration": 3.0},
+            world,
+            "full",
+        )
+        for world in ("ideal", "IAPB", "PB")
+    },
 }
 
 TILTED = "peg at every tilt"  # name of the input made by `tilted_runs`
@@ -68,8 +75,11 @@ def figure_run(runner: Runner, name: str) -> Run:
 
 
 def tilted_runs(runner: Runner) -> dict[float, dict[str, Run]]:
-    """Return the runs of the peg in the corner by tilt [rad] and world; claim C10 uses the same runs."""
+    """Return the runs of the peg in the corner by tilt [rad] and world; claim C10 uses the same
+    runs."""
     scene = shipped_scene("peg_corner")
     with runner.recording(TILTED):
-        return {tilt: {world: runner(Condition(tilt).place(scene), world) for world in IGNORED}
-                for tilt in TILTS["full"]}  # fmt: skip
+        return {
+            tilt: {world: runner(Condition(tilt).place(scene), world) for world in IGNORED}
+            for tilt in TILTS["full"]
+        }

@@ -1,10 +1,11 @@
 """A stage of the evidence: records that are computed once and then read from their file.
 
-The file holds the records, and the runs behind them, as JSON text. Its name contains a hash of what determines the
-records: the depth, the sources of the engine, the references and the verification, the scenes, the processor, the BLAS
-kernel and the optional code of numpy, and the declared external dependencies. If any of them changes, the stage is
-computed again; a change of the report's own code does not cause that. Because the machine is part of the hash, numbers
-of two machines are never mixed.
+The file holds the records, and the runs behind them, as JSON text. Its name contains a hash of what
+determines the records: the depth, the sources of the engine, the references and the verification,
+the scenes, the processor, the BLAS kernel and the optional code of numpy, and the declared external
+dependencies. If any of them changes, the stage is computed again; a change of the report's own code
+does not cause that. Because the machine is part of the hash, numbers of two machines are never
+mixed.
 """
 
 from __future__ import annotations
@@ -41,17 +42,30 @@ class Stage:
     ----------
     records : None until the stage is filled, and if it cannot be.
     runs : the runs that the records were made from, by file.
-    failures : the cases that raised. If there are any, the records are written to a file named "incomplete", which
-        later calls do not read, so that they compute the stage again.
+    failures : the cases that raised. If there are any, the records are written to a file named
+        "incomplete", which later calls do not read, so that they compute the stage again.
     seconds : the time that it took to compute or read the records.
     """
 
     def __init__(
-        self, folder: Path, name: str, kind: Any, depth: str, depends: Mapping[str, str] | None = None
+        self,
+        folder: Path,
+        name: str,
+        kind: Any,
+        depth: str,
+        depends: Mapping[str, str] | None = None,
     ) -> None:
         word = name.replace(" ", "_")
-        self.key = hash_of({"stage": word, "layout": _LAYOUT, "inputs": {"depth": depth}, "code": evidence_version(),
-                            "depends": depends or {}, "machine": this_machine()})  # fmt: skip
+        self.key = hash_of(
+            {
+                "stage": word,
+                "layout": _LAYOUT,
+                "inputs": {"depth": depth},
+                "code": evidence_version(),
+                "depends": depends or {},
+                "machine": this_machine(),
+            }
+        )
         self.name, self.kind = name, kind
         self.path = folder / f"{word}-{self.key[:16]}.h5"
         self.records: Any = None
@@ -60,10 +74,11 @@ class Stage:
         self.seconds = 0.0
 
     def fill(self, runner: Runner, compute: Callable[[list[Failure]], Any]) -> Stage:
-        """Read the records from their file if it exists, else compute and write them; return the stage.
+        """Read the records from their file if it exists, else compute and write them; return the
+        stage.
 
-        The runs that `compute` requests from `runner` are kept with the records. Exceptions are recorded as failures;
-        KeyboardInterrupt is not caught.
+        The runs that `compute` requests from `runner` are kept with the records. Exceptions are
+        recorded as failures; KeyboardInterrupt is not caught.
         """
         started = time.perf_counter()
         fill = self._read if self.path.is_file() else partial(self._compute, runner, compute)
@@ -73,7 +88,10 @@ class Stage:
 
     def _read(self) -> None:
         content = read_record(self.path)
-        self.runs = {run["file"]: StoredFile(**run | {"used_by": tuple(run["used_by"])}) for run in content["runs"]}
+        self.runs = {
+            run["file"]: StoredFile(**run | {"used_by": tuple(run["used_by"])})
+            for run in content["runs"]
+        }
         self.records = self._checked(content["records"])
 
     def _compute(self, runner: Runner, compute: Callable[[list[Failure]], Any]) -> None:
@@ -88,7 +106,9 @@ class Stage:
             self.path = incomplete
         provenance = collect_provenance() | {"sources": evidence_version()}
         content = {"runs": list(used.values()), "records": records}
-        write_record(self.path, content, f"Records of the stage {self.name}", provenance, tuple(used))
+        write_record(
+            self.path, content, f"Records of the stage {self.name}", provenance, tuple(used)
+        )
         self.records, self.runs = found, dict(used)
 
     def _checked(self, records: Any) -> Any:

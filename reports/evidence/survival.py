@@ -20,14 +20,26 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
     failures: list[Failure] = []
     repeated = tuple(of_each(FIGURE_RUNS, partial(_repeated, runner), failures))
     same = sum(repetition.same for _, repetition in repeated)
-    part = Part(f"{same} of {len(repeated)} runs of the figures repeat to the last bit when simulated again from "
-                "their own files alone.", REPRODUCED if same == len(repeated) else REFUTED, target="all",
-                asked="Runs of the figures that repeat to the last bit", measured=f"{same} of {len(repeated)}")
-    table = titled(("run", "content hash stored", "content hash, simulated again", "differs in"), [
-        (name, one.stored[:16], one.again[:16], ", ".join(map(str, one.differs)) or "nothing")
-        for name, one in repeated])  # fmt: skip
+    part = Part(
+        f"{same} of {len(repeated)} runs of the figures repeat to the last bit when simulated "
+        f"again from "
+        "their own files alone.",
+        REPRODUCED if same == len(repeated) else REFUTED,
+        target="all",
+        asked="Runs of the figures that repeat to the last bit",
+        measured=f"{same} of {len(repeated)}",
+    )
+    table = titled(
+        ("run", "content hash stored", "content hash, simulated again", "differs in"),
+        [
+            (name, one.stored[:16], one.again[:16], ", ".join(map(str, one.differs)) or "nothing")
+            for name, one in repeated
+        ],
+    )
     tables = {"simulated again": table}
-    return finding_of("survival", "Runs that repeat", LEAD, part.sentence, (part,), tables, failures)
+    return finding_of(
+        "survival", "Runs that repeat", LEAD, part.sentence, (part,), tables, failures
+    )
 
 
 def _repeated(runner: Runner, name: str) -> Any:

@@ -1,4 +1,5 @@
-"""The stages of the evidence in reading order, and the topics of the report: each is one line here."""
+"""The stages of the evidence in reading order, and the topics of the report: each is one line
+here."""
 
 from __future__ import annotations
 
@@ -23,7 +24,8 @@ from verification.table import Table
 
 Progress = Callable[[int, int], None]
 
-# key of the finding -> module and name of its topic: a `Topic`, or a function (run, depth, progress)
+# key of the finding -> module and name of its topic: a `Topic`, or a function (run, depth,
+# progress)
 TOPICS: dict[str, str] = {
     "energy-gains": "verification.laws.topic:energy_gains",
     "properties": "verification.laws.topic:properties",
@@ -34,7 +36,8 @@ TOPICS: dict[str, str] = {
     "engines": "verification.engines:engines",
     "haptic-rate": "verification.haptic_rate:TOPIC",
     "survival": "reports.evidence.survival:compute",
-    "exact-energy": "reports.evidence.exact_energy:TOPIC",  # last: it certifies the runs of all others
+    # last: it certifies the runs of all others
+    "exact-energy": "reports.evidence.exact_energy:TOPIC",
 }
 
 
@@ -52,7 +55,8 @@ def failed_topic(name: str, failure: Failure) -> Finding:
 
 @dataclass(frozen=True)
 class Plan:
-    """How a stage is computed: the type of its records, and (runner, depth, progress, failures) -> records.
+    """How a stage is computed: the type of its records, and (runner, depth, progress, failures) ->
+    records.
 
     timed : True if the stage measures times, so that nothing may run beside it
     """
@@ -62,12 +66,14 @@ class Plan:
     timed: bool = False
 
 
-AHEAD = ", without times"  # end of the name of the stage that has the checks of a timed topic that measure no time
+# end of the name of the stage that has the checks of a timed topic that measure no time
+AHEAD = ", without times"
 CLAIM_STAGES = ("claims", "claims on the peg", "claims on times")
 
 
 def stage_of(claim: str) -> str:
-    """Return the stage that checks a claim; those on the peg share runs, and take as long as all others together."""
+    """Return the stage that checks a claim; those on the peg share runs, and take as long as all
+    others together."""
     if claims.CLAIMS[claim].timed:
         return "claims on times"
     return "claims on the peg" if hasattr(peg, claim) else "claims"
@@ -76,20 +82,28 @@ def stage_of(claim: str) -> str:
 def checked_claims(
     stage: str, runner: Runner, depth: str, progress: Progress, failures: list[Failure]
 ) -> tuple[Finding, ...]:
-    """Check the claims of a stage, with runs from the store; each claim lists the runs that it uses."""
+    """Check the claims of a stage, with runs from the store; each claim lists the runs that it
+    uses."""
+
     def begin(done: int, total: int, claim: str) -> None:
         runner.user = claim
         progress(done, total)
 
     ids = [claim for claim in claims.CLAIMS if stage_of(claim) == stage]
-    found = claims.check_claims(partial(runner, keep=False), depth, ids, progress=begin, asked=runner.use_again)
-    failures += [replace(one, case=f"{claim.key}, {one.case}") if one.case != claim.key else one
-                 for claim in found for one in claim.failures]  # fmt: skip
+    found = claims.check_claims(
+        partial(runner, keep=False), depth, ids, progress=begin, asked=runner.use_again
+    )
+    failures += [
+        replace(one, case=f"{claim.key}, {one.case}") if one.case != claim.key else one
+        for claim in found
+        for one in claim.failures
+    ]
     return found
 
 
 def _plans_of(name: str) -> dict[str, Plan]:
-    """Return the plan of a topic, timed if one of its checks has a column of times, and that of its other checks.
+    """Return the plan of a topic, timed if one of its checks has a column of times, and that of its
+    other checks.
 
     The other checks are computed first, beside other stages, so that little runs alone.
     """
@@ -98,24 +112,44 @@ def _plans_of(name: str) -> dict[str, Plan]:
     timed = any(check.timed for check in checks)
     ahead = [check for check in checks if not check.timed and check.key != CERTIFIED_RUNS]
     if not (timed or len(ahead) < len(checks)):
-        return {name: Plan(Finding, lambda runner, depth, progress, failures: topic(runner, depth, progress))}
+        return {
+            name: Plan(
+                Finding, lambda runner, depth, progress, failures: topic(runner, depth, progress)
+            )
+        }
     return {
         name + AHEAD: Plan(dict[str, Table], partial(topic.measure, ahead)),
-        name: Plan(Finding, lambda runner, depth, progress, failures, known=None: topic(runner, depth, progress, known),
-                   timed),
+        name: Plan(
+            Finding,
+            lambda runner, depth, progress, failures, known=None: topic(
+                runner, depth, progress, known
+            ),
+            timed,
+        ),
     }
 
 
 def plans() -> dict[str, Plan]:
     """Return the plan of every stage by name."""
     return {
-        **{stage: Plan(tuple[Finding, ...], partial(checked_claims, stage), stage == "claims on times")
-           for stage in CLAIM_STAGES},
+        **{
+            stage: Plan(
+                tuple[Finding, ...], partial(checked_claims, stage), stage == "claims on times"
+            )
+            for stage in CLAIM_STAGES
+        },
         "proofs": Plan(tuple[ProofRecord, ...], lambda *given: check_all(*given[2:])),
         "counterexamples": Plan(tuple[Finding, ...], lambda *given: counterexamples(*given[2:])),
-        "hard cases": Plan(tuple[Finding, ...], lambda runner, _, *given: hard_cases(runner, *given), timed=True),
-        "accuracy": Plan(Table, lambda runner, depth, progress, failures: work_precision(
-            progress=progress, failures=failures), timed=True),
+        "hard cases": Plan(
+            tuple[Finding, ...], lambda runner, _, *given: hard_cases(runner, *given), timed=True
+        ),
+        "accuracy": Plan(
+            Table,
+            lambda runner, depth, progress, failures: work_precision(
+                progress=progress, failures=failures
+            ),
+            timed=True,
+        ),
         **{stage: plan for name in TOPICS for stage, plan in _plans_of(name).items()},
         "effects": Plan(dict[str, Table], lambda *given: effects_of_scenes(*given[2:]), timed=True),
-    }  # fmt: skip
+    }

@@ -1,4 +1,5 @@
-"""The figures of the report: texts and order are in figures.toml, recipes in the modules of their topics."""
+"""The figures of the report: texts and order are in figures.toml, recipes in the modules of their
+topics."""
 
 from __future__ import annotations
 
@@ -16,4 +17,6 @@ from reports.figures import (  # noqa: F401
 )
 from reports.figures.figure import MADE, TEXTS, Recipe
 
-RECIPES: tuple[Recipe, ...] = tuple(MADE[key] for key, text in TEXTS.items() if text.get("section") != "compare")
+RECIPES: tuple[Recipe, ...] = tuple(
+    MADE[key] for key, text in TEXTS.items() if text.get("section") != "compare"
+)

@@ -1,8 +1,8 @@
 """A drawn figure as plain values, the recipe that draws it, and a figure as a file of its own.
 
-A figure has a few panels (they wrap on a narrow screen), each one SVG or a table of coloured cells, a legend, a caption
-that says what to see, and the numbers behind it. Titles and captions are in figures.toml, in page order. This module
-depends neither on matplotlib nor on the page.
+A figure has a few panels (they wrap on a narrow screen), each one SVG or a table of coloured cells,
+a legend, a caption that says what to see, and the numbers behind it. Titles and captions are in
+figures.toml, in page order. This module depends neither on matplotlib nor on the page.
 """
 
 from __future__ import annotations
@@ -40,7 +40,8 @@ class Panel:
 
 
 def cell(text: str | Markup, note: str = "", color: str = "", strength: float = 0.0) -> Markup:
-    """Return a cell of a table: its text, a smaller note, and a colour of the text or, with a strength, of the cell."""
+    """Return a cell of a table: its text, a smaller note, and a colour of the text or, with a
+    strength, of the cell."""
     look = f"color: {css(color)}" if color else ""
     if strength:
         look = f"background: color-mix(in srgb, {css(color)} {100 * strength:g}%, transparent)"
@@ -50,15 +51,20 @@ def cell(text: str | Markup, note: str = "", color: str = "", strength: float = 
 
 
 def grid(columns: Sequence[str], rows: Mapping[str, Sequence[Markup]], kind: str = "") -> str:
-    """Return a table of cells as HTML: a heading for each column and, as text or Markup, for each row.
+    """Return a table of cells as HTML: a heading for each column and, as text or Markup, for each
+    row.
 
     kind : "plain" for texts instead of coloured cells
     """
     join = Markup("").join
     head = join(Markup('<th scope="col"><span>{}</span></th>').format(column) for column in columns)
-    body = join(Markup('<tr><th scope="row">{}</th>{}</tr>').format(name, join(cells)) for name, cells in rows.items())
-    return Markup('<table class="grid {}"><thead><tr><td></td>{}</tr></thead><tbody>{}</tbody></table>').format(
-        kind, head, body)  # fmt: skip
+    body = join(
+        Markup('<tr><th scope="row">{}</th>{}</tr>').format(name, join(cells))
+        for name, cells in rows.items()
+    )
+    return Markup(
+        '<table class="grid {}"><thead><tr><td></td>{}</tr></thead><tbody>{}</tbody></table>'
+    ).format(kind, head, body)
 
 
 @dataclass(frozen=True)
@@ -73,10 +79,13 @@ class Drawn:
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure. `number` is its number in the paper ("Figure 7"), or empty for a figure of this project.
+    """A figure. `number` is its number in the paper ("Figure 7"), or empty for a figure of this
+    project.
 
-    inputs : names of the runs and tables it was drawn from; missing : those that it lacks, so that it has no panels
-    said : what the paper says, what we find, what is the same, what differs; claims : the claims that it shows
+    inputs : names of the runs and tables it was drawn from; missing : those that it lacks, so that
+        it has no panels
+    said : what the paper says, what we find, what is the same, what differs; claims : the claims
+        that it shows
     section : the section of the report that has it
     """
 
@@ -96,19 +105,24 @@ class Figure:
 
 @dataclass(frozen=True)
 class Recipe:
-    """The recipe of a figure: `function` gets the inputs named in `needs`; the texts of `key` are in figures.toml."""
+    """The recipe of a figure: `function` gets the inputs named in `needs`; the texts of `key` are
+    in figures.toml."""
 
     key: str
     needs: tuple[str, ...]
     function: Callable[..., Drawn]
 
 
-TEXTS: Mapping[str, Mapping[str, Any]] = tomllib.loads(files(__package__).joinpath("figures.toml").read_text("utf-8"))
+TEXTS: Mapping[str, Mapping[str, Any]] = tomllib.loads(
+    files(__package__).joinpath("figures.toml").read_text("utf-8")
+)
 MADE: dict[str, Recipe] = {}
 
 
 def recipe(key: str, *needs: str) -> Callable[[Callable[..., Drawn]], Recipe]:
-    """Make the recipe `key` of figures.toml from the decorated function, which gets one argument per input."""
+    """Make the recipe `key` of figures.toml from the decorated function, which gets one argument
+    per input."""
+
     def made(function: Callable[..., Drawn]) -> Recipe:
         MADE[key] = Recipe(key, needs, function)
         return MADE[key]
@@ -116,72 +130,118 @@ def recipe(key: str, *needs: str) -> Callable[[Callable[..., Drawn]], Recipe]:
     return made
 
 
-def draw(recipe: Recipe, inputs: Mapping[str, Any], failures: list[Failure] | None = None) -> Figure:
-    """Draw one figure; it has no panels if inputs are missing, which it names, or if it raises, which `failures` notes.
+def draw(
+    recipe: Recipe, inputs: Mapping[str, Any], failures: list[Failure] | None = None
+) -> Figure:
+    """Draw one figure; it has no panels if inputs are missing, which it names, or if it raises,
+    which `failures` notes.
 
     If `failures` is None, an exception propagates.
     """
-    text, missing = TEXTS[recipe.key], tuple(name for name in recipe.needs if inputs.get(name) is None)
-    bare = Figure(recipe.key, text.get("number", ""), text["title"], missing=missing,
-                  section=text.get("section", "figures"))
+    text, missing = (
+        TEXTS[recipe.key],
+        tuple(name for name in recipe.needs if inputs.get(name) is None),
+    )
+    bare = Figure(
+        recipe.key,
+        text.get("number", ""),
+        text["title"],
+        missing=missing,
+        section=text.get("section", "figures"),
+    )
 
     def drawn() -> Figure:
         made = recipe.function(*(inputs[name] for name in recipe.needs))
-        caption, *said = (" ".join(words.split()).format(**made.told)
-                          for words in (text.get("caption", ""), *text.get("said", ())))
-        return replace(bare, caption=caption, panels=tuple(made.panels), numbers=made.numbers,
-                       legend=tuple(dict(made.legend).items()), inputs=recipe.needs, said=tuple(said),
-                       claims=text.get("claims", ()))
+        caption, *said = (
+            " ".join(words.split()).format(**made.told)
+            for words in (text.get("caption", ""), *text.get("said", ()))
+        )
+        return replace(
+            bare,
+            caption=caption,
+            panels=tuple(made.panels),
+            numbers=made.numbers,
+            legend=tuple(dict(made.legend).items()),
+            inputs=recipe.needs,
+            said=tuple(said),
+            claims=text.get("claims", ()),
+        )
 
     return (None if missing else attempt(recipe.key, drawn, failures)) or bare
 
 
-# A figure as a file of its own: panels side by side over the legend; colours are the fallbacks of the page's variables
+# A figure as a file of its own: panels side by side over the legend; colours are the fallbacks of
+# the page's variables
 
 _GAP, _LABEL, _LEGEND = 24.0, 26.0, 34.0  # points: between panels, above them, below them
 _LETTER = 6.4  # points: mean width of a letter of the legend
 _FONT = 'font-family="DejaVu Sans, Verdana, sans-serif" font-size="11"'
 _TABLE = (
-    "body { font: 14px/1.4 Verdana, sans-serif } table { border-collapse: collapse } th { font-weight: 400 } "
-    "td, th { padding: .3em .6em; text-align: center; border: 2px solid #fff } small { display: block } "
+    "body { font: 14px/1.4 Verdana, sans-serif } table { border-collapse: collapse } th { "
+    "font-weight: 400 } "
+    "td, th { padding: .3em .6em; text-align: center; border: 2px solid #fff } small { display: "
+    "block } "
     "th[scope=row], .plain * { text-align: left } .swatch { width: 36px; height: 14px } "
     "li { list-style: none }"
 )
 _MARKERS = {  # paths around (18, 7)
-    "o": "M14.4 7a3.6 3.6 0 1 0 7.2 0a3.6 3.6 0 1 0 -7.2 0z", "s": "M14.6 3.6h6.8v6.8h-6.8z",
-    "^": "M18 2.6 22 10.4 14 10.4z", "v": "M18 11.4 22 3.6 14 3.6z", "<": "M13.6 7 21.4 11V3z",
-    ">": "M22.4 7 14.6 11V3z", "D": "M18 2.4 22.6 7 18 11.6 13.4 7z", "d": "M18 2 20.6 7 18 12 15.4 7z",
-    "P": "M16.4 3h3.2v2.4H22v3.2h-2.4V11h-3.2V8.6H14V5.4h2.4z", "|": "M17 2h2v10h-2z",
+    "o": "M14.4 7a3.6 3.6 0 1 0 7.2 0a3.6 3.6 0 1 0 -7.2 0z",
+    "s": "M14.6 3.6h6.8v6.8h-6.8z",
+    "^": "M18 2.6 22 10.4 14 10.4z",
+    "v": "M18 11.4 22 3.6 14 3.6z",
+    "<": "M13.6 7 21.4 11V3z",
+    ">": "M22.4 7 14.6 11V3z",
+    "D": "M18 2.4 22.6 7 18 11.6 13.4 7z",
+    "d": "M18 2 20.6 7 18 12 15.4 7z",
+    "P": "M16.4 3h3.2v2.4H22v3.2h-2.4V11h-3.2V8.6H14V5.4h2.4z",
+    "|": "M17 2h2v10h-2z",
     "X": "M14.5 5 16 3.5l2 2 2-2L21.5 5l-2 2 2 2L20 10.5l-2-2-2 2L14.5 9l2-2z",
     "*": "M18 2l1.4 3.4 3.6.2-2.8 2.3 1 3.6L18 9.5l-3.2 2 1-3.6L13 5.6l3.6-.2z",
-}  # fmt: skip
+}
 
 
 def swatch(look: LineStyle) -> Markup:
     """Return the line and marker of a style, for legends, as a small inline SVG."""
     line = marker = ""
     if look.width:
-        dash = f' stroke-dasharray="{" ".join(f"{1.6 * part:g}" for part in look.dash)}"' if look.dash else ""
+        dash = (
+            f' stroke-dasharray="{" ".join(f"{1.6 * part:g}" for part in look.dash)}"'
+            if look.dash
+            else ""
+        )
         line = f'<path d="M1 7H35" fill="none" stroke="{css(look.color)}" stroke-width="{look.width * 1.25:g}"{dash}/>'
     if look.marker:
         fill, edge = (look.color, PAPER) if look.filled else (PAPER, look.color)
         marker = f'<path fill="{css(fill)}" stroke="{css(edge)}" d="{_MARKERS[look.marker]}"/>'
-    return Markup(f'<svg class="swatch" viewBox="0 0 36 14" aria-hidden="true">{line}{marker}</svg>')
+    return Markup(
+        f'<svg class="swatch" viewBox="0 0 36 14" aria-hidden="true">{line}{marker}</svg>'
+    )
 
 
 def standalone(figure: Figure) -> str:
     """Return the figure as the text of one SVG file, or of one HTML file if a panel is a table."""
     if any(panel.is_table for panel in figure.panels):
-        legend = Markup("").join(Markup("<li>{} {}</li>").format(swatch(look), text) for text, look in figure.legend)
-        panels = Markup("").join(Markup("<h3>{}</h3>{}").format(panel.label, Markup(panel.svg))
-                                 for panel in figure.panels)  # fmt: skip
-        return str(Markup('<!DOCTYPE html>\n<meta charset="utf-8"><title>{0}</title><style>{1}</style>\n<h2>{0}</h2>'
-                          "<ul>{2}</ul>{3}<p>{4}</p>\n").format(figure.title, Markup(_TABLE), legend, panels,
-                                                                figure.caption))  # fmt: skip
+        legend = Markup("").join(
+            Markup("<li>{} {}</li>").format(swatch(look), text) for text, look in figure.legend
+        )
+        panels = Markup("").join(
+            Markup("<h3>{}</h3>{}").format(panel.label, Markup(panel.svg))
+            for panel in figure.panels
+        )
+        return str(
+            Markup(
+                '<!DOCTYPE html>\n<meta charset="utf-8"><title>{0}</title><style>{1}</style>\n<h2>{0}</h2>'
+                "<ul>{2}</ul>{3}<p>{4}</p>\n"
+            ).format(figure.title, Markup(_TABLE), legend, panels, figure.caption)
+        )
     parts, x, tallest = [], _GAP, 0.0
     for panel in figure.panels:
-        width, height = (float(part) for part in re.findall(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', panel.svg)[0])
-        parts.append(f'<text x="{x:g}" y="{_LABEL - 6:g}" fill="{MUTED}">{escape(panel.label)}</text>')
+        width, height = (
+            float(part) for part in re.findall(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', panel.svg)[0]
+        )
+        parts.append(
+            f'<text x="{x:g}" y="{_LABEL - 6:g}" fill="{MUTED}">{escape(panel.label)}</text>'
+        )
         place = f'<svg x="{x:g}" y="{_LABEL:g}" width="{width:g}" height="{height:g}"'
         parts.append(panel.svg.replace("<svg", place, 1))
         x, tallest = x + width + _GAP, max(tallest, height)
@@ -189,12 +249,22 @@ def standalone(figure: Figure) -> str:
     whole, below = max(x, sum(steps) + 2 * _GAP), tallest + _LABEL + _GAP + 0.5 * _LEGEND
     x = (whole - sum(steps)) / 2
     for (text, look), step in zip(figure.legend, steps, strict=True):
-        parts.append(str(swatch(look)).replace("<svg", f'<svg x="{x:g}" y="{below - 11:g}" width="36" height="14"', 1))
+        parts.append(
+            str(swatch(look)).replace(
+                "<svg", f'<svg x="{x:g}" y="{below - 11:g}" width="36" height="14"', 1
+            )
+        )
         parts.append(f'<text x="{x + 44:g}" y="{below:g}" fill="{INK}">{escape(text)}</text>')
         x += step
     width, height = whole, below + 0.5 * _LEGEND
-    return "\n".join([
-        f'<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" '
-        f'viewBox="0 0 {width:g} {height:g}" width="{width:g}" height="{height:g}" role="img" {_FONT}>',
-        f"<title>{escape(figure.title)}</title><desc>{escape(' '.join(panel.alt for panel in figure.panels))}</desc>",
-        f'<rect width="100%" height="100%" fill="{PAPER}"/>', *parts, "</svg>\n"])  # fmt: skip
+    return "\n".join(
+        [
+            f'<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" '
+            f'viewBox="0 0 {width:g} {height:g}" width="{width:g}" height="{height:g}" role="img" {_FONT}>',
+            f"<title>{escape(figure.title)}</title>"
+            f"<desc>{escape(' '.join(panel.alt for panel in figure.panels))}</desc>",
+            f'<rect width="100%" height="100%" fill="{PAPER}"/>',
+            *parts,
+            "</svg>\n",
+        ]
+    )

@@ -1,8 +1,10 @@
-"""The film of the peg in the corner: animated SVG that the browser plays; the page's script adds a slider.
+"""The film of the peg in the corner: animated SVG that the browser plays; the page's script adds a
+slider.
 
-Each body is a group whose place and angle follow the poses of a run (`animateTransform`) at a few hundred moments. The
-moments are evenly spaced in time; those around the first impacts are added. Contacts and impulses are marks that are
-visible from one moment to the next. A picture has SIZE units; as in the paper, x is to the left and y down.
+Each body is a group whose place and angle follow the poses of a run (`animateTransform`) at a few
+hundred moments. The moments are evenly spaced in time; those around the first impacts are added.
+Contacts and impulses are marks that are visible from one moment to the next. A picture has SIZE
+units; as in the paper, x is to the left and y down.
 """
 
 from __future__ import annotations
@@ -21,10 +23,17 @@ from reports.figures.style import BLUE, FORCE, INK, PEG, WALL, css
 from verification.table import titled
 
 SIZE = (400, 300)
-_MOMENTS, _IMPACTS, _MARKED = 160, 30, 60  # moments of a film, first impacts that it adds, moments with marks
+_MOMENTS, _IMPACTS, _MARKED = (
+    160,
+    30,
+    60,
+)  # moments of a film, first impacts that it adds, moments with marks
 _MARGIN = 0.08  # of the picture
 _REACH = 50.0  # the side of a half-plane that is drawn, in sizes of the bodies
-_LASTS, _SLOWER = 5.0, (1, 2, 5, 10, 20, 50)  # seconds that a film takes at least; how much slower it can be
+_LASTS, _SLOWER = (
+    5.0,
+    (1, 2, 5, 10, 20, 50),
+)  # seconds that a film takes at least; how much slower it can be
 _BEFORE = 0.03  # a film begins so long before the first contact [s]
 _STRONGEST = 12  # contacts marked at a moment
 
@@ -35,25 +44,38 @@ def film_corner(*runs: Run) -> Drawn:
     end = max(float(run.time[-1]) for run in runs)
     slower = next((each for each in _SLOWER if each * end >= _LASTS), _SLOWER[-1])
     low, high = bounds_of(runs)
-    touching = [run.time[np.flatnonzero(np.diff(run.contacts.offsets))[0]] for run in runs if len(run.contacts.gap)]
+    touching = [
+        run.time[np.flatnonzero(np.diff(run.contacts.offsets))[0]]
+        for run in runs
+        if len(run.contacts.gap)
+    ]
     start = max(min(touching, default=0.0) - _BEFORE, 0.0)
     head = f'data-duration="{end:g}" data-slower="{slower}" data-start="{start:.4g}"'
     panels, rows = [], []
     for world, run in zip(UNLIMITED, runs, strict=True):
         film = Film(run, low, SIZE[0] / float(high[0] - low[0]), end, slower)
         alt = f"{run.scene_resolved['title']}, in the world {world}: a film of {end:.2f} s, {slower} times slower."
-        svg = (f'<svg viewBox="0 0 {SIZE[0]} {SIZE[1]}" xmlns="http://www.w3.org/2000/svg" {head} '
-               f'style="max-width: 620px">{film.walls()}{"".join(film.bodies())}{"".join(film.marks())}</svg>')
+        svg = (
+            f'<svg viewBox="0 0 {SIZE[0]} {SIZE[1]}" xmlns="http://www.w3.org/2000/svg" {head} '
+            f'style="max-width: 620px">{film.walls()}{"".join(film.bodies())}{"".join(film.marks())}</svg>'
+        )
         panels.append(Panel(svg, alt, world, film=True))
-        rows.append((world, float(run.time[-1]), run.steps, len(run.contacts.gap), len(run.impacts.step)))
+        rows.append(
+            (world, float(run.time[-1]), run.steps, len(run.contacts.gap), len(run.impacts.step))
+        )
     titles = ("world", "simulated [s]", "steps", "contacts, summed over the steps", "impacts")
     return Drawn(panels, titled(titles, rows, digits=3))
 
 
 def bounds_of(runs: Sequence[Run]) -> tuple[Floats, Floats]:
-    """Return the corners [m] of a picture that contains all bodies at all times, x to the left and y down."""
-    points = [-corners for run in runs for step in _moments(run, _MARKED)
-              for corners in body_outlines(run.scene_resolved, run.pose[step])]
+    """Return the corners [m] of a picture that contains all bodies at all times, x to the left and
+    y down."""
+    points = [
+        -corners
+        for run in runs
+        for step in _moments(run, _MARKED)
+        for corners in body_outlines(run.scene_resolved, run.pose[step])
+    ]
     return widened(*bounds(points, _MARGIN), SIZE[0] / SIZE[1])
 
 
@@ -67,7 +89,8 @@ def _moments(run: Run, count: int) -> Floats:
 
 @dataclass(frozen=True)
 class Film:
-    """The SVG of one run: `corner` (2,) [m] is the picture's lower left, `scale` is in units per metre."""
+    """The SVG of one run: `corner` (2,) [m] is the picture's lower left, `scale` is in units per
+    metre."""
 
     run: Run
     corner: Floats
@@ -99,35 +122,53 @@ class Film:
             rings = [own * outline(shape) for shape in body["shapes"]]
             places = [f"{x:.1f} {y:.1f}" for x, y in self.flat(self.run.pose[steps, k, :2])]
             turns = [f"{angle:.1f}" for angle in -np.degrees(self.run.pose[steps, k, 2])]
-            moved, turned = (self.animated("translate", places, times), self.animated("rotate", turns, times))
+            moved, turned = (
+                self.animated("translate", places, times),
+                self.animated("rotate", turns, times),
+            )
             yield f'<g>{moved}<g><path {look} d="{"".join(map(_ring, rings))}"/>{turned}</g></g>'
 
     def animated(self, kind: str, values: Sequence[str], times: Sequence[str]) -> str:
-        """Return the change of a transform; while it stands still, its first and last moments are enough."""
-        kept = [k for k in range(len(values)) if k in (0, len(values) - 1) or len({*values[k - 1 : k + 2]}) > 1]
+        """Return the change of a transform; while it stands still, its first and last moments are
+        enough."""
+        kept = [
+            k
+            for k in range(len(values))
+            if k in (0, len(values) - 1) or len({*values[k - 1 : k + 2]}) > 1
+        ]
         listed = (";".join(each[k] for k in kept) for each in (values, times))
-        return (f'<animateTransform attributeName="transform" type="{kind}" values="{next(listed)}" '
-                f'keyTimes="{next(listed)}" dur="{self.slower * self.end:g}s" repeatCount="indefinite"/>')
+        return (
+            f'<animateTransform attributeName="transform" type="{kind}" values="{next(listed)}" '
+            f'keyTimes="{next(listed)}" dur="{self.slower * self.end:g}s" repeatCount="indefinite"/>'
+        )
 
     def marks(self) -> Iterator[str]:
-        """Yield the contacts at a moment and the impulses since the one before: of the strongest ones, a dot and a line
-        for each contact, a cross for each impulse; the size is a root of the strength."""
+        """Yield the contacts at a moment and the impulses since the one before: of the strongest
+        ones, a dot and a line for each contact, a cross for each impulse; the size is a root of the
+        strength."""
         contacts, steps = self.run.contacts, _moments(self.run, _MARKED)
         for strengths, color in ((contacts.normal_force, BLUE), (contacts.impulse, FORCE)):
-            drawn: list[tuple[str, int, int]] = []  # marks, and the moments from and until which they are visible
+            drawn: list[
+                tuple[str, int, int]
+            ] = []  # marks, and the moments from and until which they are visible
             for k, step in enumerate(steps[:-1]):
                 first = step if color == BLUE or k == 0 else steps[k - 1]
                 begins, ends = int(contacts.offsets[first]), int(contacts.offsets[step + 1])
                 chosen = begins + np.flatnonzero(strengths[begins:ends] > 0.0)
                 strongest = chosen[np.argsort(-strengths[chosen], kind="stable")][:_STRONGEST]
-                mark = "".join(self.mark(row, np.sqrt(strengths[row] / strengths.max()), color) for row in strongest)
+                mark = "".join(
+                    self.mark(row, np.sqrt(strengths[row] / strengths.max()), color)
+                    for row in strongest
+                )
                 since = drawn.pop()[1] if drawn and drawn[-1][0] == mark else step
                 drawn.append((mark, since, steps[k + 1]))
             shown = "".join(
                 f'<path d="{mark}"><animate attributeName="display" values="none;inline;none" calcMode="discrete" '
                 f'keyTimes="0;{max(self.run.time[begin] / self.end, 1e-4):.4f};{self.run.time[end] / self.end:.4f}" '
                 f'dur="{self.slower * self.end:g}s" repeatCount="indefinite"/></path>'
-                for mark, begin, end in drawn if mark)  # fmt: skip
+                for mark, begin, end in drawn
+                if mark
+            )
             yield f'<g fill="none" stroke="{css(color)}" stroke-width="2" stroke-linejoin="round">{shown}</g>'
 
     def mark(self, row: int, size: float, color: str) -> str:

@@ -1,8 +1,10 @@
-"""The outlines and solids of a scene, from its resolved file and the poses of a run: for pictures, films, the browser.
+"""The outlines and solids of a scene, from its resolved file and the poses of a run: for pictures,
+films, the browser.
 
-A planar scene lies in the plane z = 0. Its outlines are (n, 2) arrays of corners; its solids are a tenth of the scene's
-size thick. The view of pictures is axonometric: parallel lines stay parallel and sizes do not depend on the distance.
-Quaternions of a run are x, y, z, w; rpy rotates about the fixed x, y and z axes in this order.
+A planar scene lies in the plane z = 0. Its outlines are (n, 2) arrays of corners; its solids are a
+tenth of the scene's size thick. The view of pictures is axonometric: parallel lines stay parallel
+and sizes do not depend on the distance. Quaternions of a run are x, y, z, w; rpy rotates about the
+fixed x, y and z axes in this order.
 """
 
 from __future__ import annotations
@@ -47,20 +49,30 @@ class Placement:
 
 
 def placement_of(shape: Mapping[str, Any]) -> Placement:
-    """Return the frame of a shape of a resolved scene, from its `angle` (plane) or its `rpy` (space)."""
+    """Return the frame of a shape of a resolved scene, from its `angle` (plane) or its `rpy`
+    (space)."""
     turn = Rotation.from_euler("xyz", shape.get("rpy", (0.0, 0.0, shape.get("angle", 0.0))))
     return Placement(turn.as_matrix(), np.resize([*shape.get("center", (0.0, 0.0)), 0.0], 3))
 
 
 def body_placements(scene: Mapping[str, Any], pose: Floats | None = None) -> dict[str, Placement]:
-    """Return the placement of every body, at a pose (bodies, 3 or 7) of a run or at the start of the scene."""
+    """Return the placement of every body, at a pose (bodies, 3 or 7) of a run or at the start of
+    the scene."""
     if pose is None:
         checked = scene_kind(scene).model_validate(scene)
-        pose = mechanism_of(checked).poses(start_of(checked)[0][None], planar=not is_spatial(scene))[0]
-    turns = Rotation.from_quat(pose[:, 3:]) if is_spatial(scene) else Rotation.from_rotvec(pose[:, 2:] * [0, 0, 1])
+        pose = mechanism_of(checked).poses(
+            start_of(checked)[0][None], planar=not is_spatial(scene)
+        )[0]
+    turns = (
+        Rotation.from_quat(pose[:, 3:])
+        if is_spatial(scene)
+        else Rotation.from_rotvec(pose[:, 2:] * [0, 0, 1])
+    )
     origins = pose[:, :3] * [1.0, 1.0, is_spatial(scene)]
-    return {body["name"]: Placement(turn, origin) for body, turn, origin in
-            zip(scene["bodies"], turns.as_matrix(), origins, strict=True)}  # fmt: skip
+    return {
+        body["name"]: Placement(turn, origin)
+        for body, turn, origin in zip(scene["bodies"], turns.as_matrix(), origins, strict=True)
+    }
 
 
 # In the plane
@@ -71,7 +83,9 @@ def outline(shape: Mapping[str, Any]) -> Floats:
     frame = placement_of(shape)
     if shape["kind"] == "circle":
         return frame.of(shape["radius"] * _circle())
-    return frame.of(0.5 * np.asarray(shape["size"]) * _SQUARE if shape["kind"] == "box" else shape["vertices"])
+    return frame.of(
+        0.5 * np.asarray(shape["size"]) * _SQUARE if shape["kind"] == "box" else shape["vertices"]
+    )
 
 
 def _circle() -> Floats:
@@ -91,28 +105,38 @@ def half_plane(wall: Mapping[str, Any], reach: float) -> Floats:
 def body_outlines(scene: Mapping[str, Any], pose: Floats | None = None) -> list[Floats]:
     """Return the corners, in world axes, of every shape of every body."""
     places = body_placements(scene, pose)
-    return [places[body["name"]].of(outline(shape)) for body in scene["bodies"] for shape in body["shapes"]]
+    return [
+        places[body["name"]].of(outline(shape))
+        for body in scene["bodies"]
+        for shape in body["shapes"]
+    ]
 
 
 def wall_outlines(scene: Mapping[str, Any], reach: float) -> list[Floats]:
     """Return the corners of the static world, of half-planes those of a piece of size `reach`."""
-    return [half_plane(wall, reach) if wall["kind"] == "half_plane" else outline(wall) for wall in scene["walls"]]
+    return [
+        half_plane(wall, reach) if wall["kind"] == "half_plane" else outline(wall)
+        for wall in scene["walls"]
+    ]
 
 
 def is_turned(scene: Mapping[str, Any]) -> bool:
-    """Return whether a scene uses the paper's frame, x to the left and y down: it is drawn turned by 180 degrees."""
+    """Return whether a scene uses the paper's frame, x to the left and y down: it is drawn turned
+    by 180 degrees."""
     return str(scene["name"]).startswith("peg_")
 
 
 def bounds(points: Sequence[Floats], margin: float) -> tuple[Floats, Floats]:
-    """Return the lower and upper corner of the box around all points, widened by a share of its longer side."""
+    """Return the lower and upper corner of the box around all points, widened by a share of its
+    longer side."""
     every = np.vstack(points)
     low, high = every.min(axis=0), every.max(axis=0)
     return low - margin * max(high - low), high + margin * max(high - low)
 
 
 def widened(low: Floats, high: Floats, proportion: float) -> tuple[Floats, Floats]:
-    """Return the smallest rectangle with width / height = `proportion` around the given one, same centre."""
+    """Return the smallest rectangle with width / height = `proportion` around the given one, same
+    centre."""
     width, height = high - low
     half = np.array([max(width, height * proportion), max(height, width / proportion)]) / 2
     return (low + high) / 2 - half, (low + high) / 2 + half
@@ -123,7 +147,8 @@ def widened(low: Floats, high: Floats, proportion: float) -> tuple[Floats, Float
 
 @dataclass(frozen=True)
 class Solid:
-    """A shape in the frame of its body ("" is the world): corners (n, 3) [m], and its sides as rings of corners.
+    """A shape in the frame of its body ("" is the world): corners (n, 3) [m], and its sides as
+    rings of corners.
 
     Rings are counter-clockwise seen from outside.
     """
@@ -135,10 +160,18 @@ class Solid:
     @property
     def faces(self) -> NDArray[np.int64]:
         """Triangles (m, 3) of corners that fill the rings."""
-        return np.array([(ring[0], ring[k], ring[k + 1]) for ring in self.rings for k in range(1, len(ring) - 1)])
+        return np.array(
+            [
+                (ring[0], ring[k], ring[k + 1])
+                for ring in self.rings
+                for k in range(1, len(ring) - 1)
+            ]
+        )
 
 
-def prism(body: str, corners: Floats, low: float, high: float, frame: Placement | None = None) -> Solid:
+def prism(
+    body: str, corners: Floats, low: float, high: float, frame: Placement | None = None
+) -> Solid:
     """Return the prism over a convex outline (n, 2), from height `low` to `high` of its frame."""
     turned = np.roll(corners, -1, axis=0)
     if np.sum(corners[:, 0] * turned[:, 1] - corners[:, 1] * turned[:, 0]) < 0.0:
@@ -161,22 +194,32 @@ def plane_frame(wall: Mapping[str, Any]) -> Placement:
     normal = np.asarray(wall["normal"], dtype=float) / np.linalg.norm(wall["normal"])
     along = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
     along = along / np.linalg.norm(along)
-    return Placement(np.column_stack([along, np.cross(normal, along), normal]), np.asarray(wall["point"], dtype=float))
+    return Placement(
+        np.column_stack([along, np.cross(normal, along), normal]),
+        np.asarray(wall["point"], dtype=float),
+    )
 
 
 def _ball(body: str, center: Any, radius: float) -> Solid:
     """Return a sphere with corners on circles of latitude and longitude."""
     n = 2 * _RINGS
-    t, p = np.meshgrid(np.linspace(0.0, np.pi, _RINGS + 1), np.linspace(0.0, 2.0 * np.pi, n, endpoint=False),
-                       indexing="ij")  # fmt: skip
+    t, p = np.meshgrid(
+        np.linspace(0.0, np.pi, _RINGS + 1),
+        np.linspace(0.0, 2.0 * np.pi, n, endpoint=False),
+        indexing="ij",
+    )
     points = np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], -1).reshape(-1, 3)
-    rings = [(i * n + j, (i + 1) * n + j, (i + 1) * n + (j + 1) % n, i * n + (j + 1) % n)
-             for i in range(_RINGS) for j in range(n)]  # fmt: skip
+    rings = [
+        (i * n + j, (i + 1) * n + j, (i + 1) * n + (j + 1) % n, i * n + (j + 1) % n)
+        for i in range(_RINGS)
+        for j in range(n)
+    ]
     return Solid(body, np.asarray(center, dtype=float) + radius * points, rings)
 
 
 def solids(scene: Mapping[str, Any], size: float | None = None) -> Iterator[Solid]:
-    """Yield every shape of a resolved scene of the given size [m], by default that of its extent."""
+    """Yield every shape of a resolved scene of the given size [m], by default that of its
+    extent."""
     if size is None:
         size = float(np.linalg.norm(np.subtract(*extent(scene))))
     owned = [(body["name"], shape) for body in scene["bodies"] for shape in body["shapes"]]
@@ -198,7 +241,11 @@ def solids(scene: Mapping[str, Any], size: float | None = None) -> Iterator[Soli
 def extent(scene: Mapping[str, Any]) -> tuple[Floats, Floats]:
     """Return the lower and upper corner (3,) [m] of all bounded shapes in the initial state."""
     places = {"": placement_of({}), **body_placements(scene)}
-    bounded = solids({**scene, "walls": [wall for wall in scene["walls"] if "normal" not in wall]}, 0.0)
-    every = np.vstack([place.origin for name, place in places.items() if name]
-                      + [places[solid.body].of(solid.vertices) for solid in bounded])  # fmt: skip
+    bounded = solids(
+        {**scene, "walls": [wall for wall in scene["walls"] if "normal" not in wall]}, 0.0
+    )
+    every = np.vstack(
+        [place.origin for name, place in places.items() if name]
+        + [places[solid.body].of(solid.vertices) for solid in bounded]
+    )
     return every.min(axis=0), every.max(axis=0)

@@ -1,4 +1,5 @@
-"""Format numbers for readers: a true minus sign, superscript powers of ten, equal digits within a column."""
+"""Format numbers for readers: a true minus sign, superscript powers of ten, equal digits within a
+column."""
 
 from __future__ import annotations
 
@@ -48,5 +49,6 @@ def format_cell(value: Any, digits: int = 4) -> str:
 
 
 def is_number(value: Any) -> bool:
-    """Return whether a cell is aligned to the right: it is a number, or None, which is printed as a dash."""
+    """Return whether a cell is aligned to the right: it is a number, or None, which is printed as a
+    dash."""
     return value is None or (hasattr(value, "__float__") and not isinstance(value, bool | str))

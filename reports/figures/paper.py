@@ -1,7 +1,9 @@
-"""Figures 1 to 5 and Table I, and other scenes of the plane at their start: drawn from scene files and one run.
+"""Figures 1 to 5 and Table I, and other scenes of the plane at their start: drawn from scene files
+and one run.
 
-The arm of Figures 2 and 3 is straight, q = (π/2, 0), q̇₀ = (1, 1) rad/s, and is struck perpendicular to the second link
-at A (0.7 m) or B (0.5 m). The paper does not state the mass distribution, so Figure 3 has two.
+The arm of Figures 2 and 3 is straight, q = (π/2, 0), q̇₀ = (1, 1) rad/s, and is struck
+perpendicular to the second link at A (0.7 m) or B (0.5 m). The paper does not state the mass
+distribution, so Figure 3 has two.
 """
 
 from __future__ import annotations
@@ -35,8 +37,16 @@ from reports.figures.style import (
 from verification.table import titled
 
 _LONGEST = 0.22  # arrow length of Figure 1, as a share of the picture
-_ARROW, _AXIS, _WALL = 0.02, 0.006, 0.008  # Figure 4 [m]: an arrow per newton, the drawn axes, the walls shown
-_BOARD = np.zeros(2), np.array([8.2, 5.2])  # corners of the diagrams of Figure 5, in arbitrary units
+_ARROW, _AXIS, _WALL = (
+    0.02,
+    0.006,
+    0.008,
+)  # Figure 4 [m]: an arrow per newton, the drawn axes, the walls shown
+_BOARD = (
+    np.zeros(2),
+    np.array([8.2, 5.2]),
+)  # corners of the diagrams of Figure 5, in arbitrary units
+
 
 @recipe("fig01", "group/IAPB")
 def contact_forces(run: Run) -> Drawn:
@@ -44,7 +54,9 @@ def contact_forces(run: Run) -> Drawn:
     impulses, forces, scene = run.contacts.impulse, run.contacts.normal_force, run.scene_resolved
     touching, instants = np.flatnonzero(np.diff(run.contacts.offsets)), []
     if impulses.any():
-        hardest = np.searchsorted(run.contacts.offsets, np.argmax(np.abs(impulses)), side="right") - 1
+        hardest = (
+            np.searchsorted(run.contacts.offsets, np.argmax(np.abs(impulses)), side="right") - 1
+        )
         instants.append(("(a) colliding: impulses", int(hardest), impulses, "N s"))
     if len(touching):
         instants.append(("(b) resting: forces", int(touching[-1]), forces, "N"))
@@ -60,36 +72,75 @@ def contact_forces(run: Run) -> Drawn:
                 point = run.contacts.point[k, :2]
                 canvas.axes.plot(*point, "o", color=INK, markersize=3.5, zorder=7)
                 if values[k]:
-                    arrow(canvas.axes, point, longest * values[k] / largest * run.contacts.normal[k, :2], color=BLUE)
+                    arrow(
+                        canvas.axes,
+                        point,
+                        longest * values[k] / largest * run.contacts.normal[k, :2],
+                        color=BLUE,
+                    )
             canvas.hand(scene, pose, 0.8 * longest)
         told = ", ".join(f"{values[k]:.3g} {unit}" for k in contacts)
-        panels.append(Panel(canvas.svg, f"The group at t = {run.time[step]:.3f} s with its contacts; along their "
-                            f"normals: {told}.", title))  # fmt: skip
-        rows += [(title[4:], float(run.time[step]), *map(float, 1e3 * run.contacts.point[k, :2]), float(values[k]),
-                  unit) for k in contacts]  # fmt: skip
-    return Drawn(panels, titled(("instant", "t [s]", "contact x [mm]", "y [mm]", "impulse or force along the normal",
-                                 "unit"), rows))
+        panels.append(
+            Panel(
+                canvas.svg,
+                f"The group at t = {run.time[step]:.3f} s with its contacts; along their "
+                f"normals: {told}.",
+                title,
+            )
+        )
+        rows += [
+            (
+                title[4:],
+                float(run.time[step]),
+                *map(float, 1e3 * run.contacts.point[k, :2]),
+                float(values[k]),
+                unit,
+            )
+            for k in contacts
+        ]
+    return Drawn(
+        panels,
+        titled(
+            (
+                "instant",
+                "t [s]",
+                "contact x [mm]",
+                "y [mm]",
+                "impulse or force along the normal",
+                "unit",
+            ),
+            rows,
+        ),
+    )
 
 
 LENGTH = 1.0  # of both links [m]
 CONTACTS = {"A": 0.7, "B": 0.5}  # distance along the second link [m]
 VELOCITY = np.array([1.0, 1.0])  # [rad/s]
-# M of the straight arm [kg m²], its links of 1 m and 1 kg: slender uniform rods, or all mass at the far ends
-READINGS = {"uniform rods": np.array([[8 / 3, 5 / 6], [5 / 6, 1 / 3]]),
-            "point masses": np.array([[5.0, 2.0], [2.0, 1.0]])}  # fmt: skip
+# M of the straight arm [kg m²], its links of 1 m and 1 kg: slender uniform rods, or all mass at the
+# far ends
+READINGS = {
+    "uniform rods": np.array([[8 / 3, 5 / 6], [5 / 6, 1 / 3]]),
+    "point masses": np.array([[5.0, 2.0], [2.0, 1.0]]),
+}
 RESTITUTIONS = np.linspace(0.0, 1.0, 41)
 
 
 def arm_energies() -> dict[str, Floats]:
-    """Return the data of the figure: ``restitution``, and KE and KE₀ [J] by mass distribution and contact point."""
+    """Return the data of the figure: ``restitution``, and KE and KE₀ [J] by mass distribution and
+    contact point."""
     table: dict[str, Floats] = {"restitution": RESTITUTIONS}
     for reading, mass in READINGS.items():
         before = 0.5 * VELOCITY @ mass @ VELOCITY
         table[f"{reading}, KE0"] = np.full(len(RESTITUTIONS), before)
         for name, distance in CONTACTS.items():
             row = -np.array([[LENGTH + distance, distance]])  # opposite to the motion
-            table[f"{reading}, {name}"] = np.array([before + resolve_impact(mass, row, VELOCITY, e).energy_change
-                                                    for e in RESTITUTIONS])  # fmt: skip
+            table[f"{reading}, {name}"] = np.array(
+                [
+                    before + resolve_impact(mass, row, VELOCITY, e).energy_change
+                    for e in RESTITUTIONS
+                ]
+            )
     return table
 
 
@@ -102,20 +153,38 @@ def arm(scene: Mapping[str, Any], _: Mapping[str, Any]) -> Drawn:
     low, high = joints.min(axis=0) - (1.25, 0.22), joints.max(axis=0) + (1.25, 0.12)
     with Canvas("fig02", low, high, (3.6, 3.3)) as canvas:
         axes = canvas.axes
-        axes.fill(pivot[0] + np.array([-0.14, 0.14, 0.14, -0.14]), pivot[1] + np.array([-0.16, -0.16, -0.08, -0.08]),
-                  facecolor=MUTED, edgecolor="none", alpha=0.6)
+        axes.fill(
+            pivot[0] + np.array([-0.14, 0.14, 0.14, -0.14]),
+            pivot[1] + np.array([-0.16, -0.16, -0.08, -0.08]),
+            facecolor=MUTED,
+            edgecolor="none",
+            alpha=0.6,
+        )
         axes.plot([pivot[0], pivot[0]], [pivot[1] - 0.08, pivot[1]], color=INK, linewidth=2)
         for number, line in enumerate((joints[:2], joints[1:]), start=1):
             for color, width in ((LINK, 10), (PEG, 8)):
                 axes.plot(*line.T, color=color, linewidth=width, solid_capstyle="round", zorder=2)
-            axes.plot(*line[0], "o", markersize=7, markerfacecolor=PAPER, markeredgecolor=INK, zorder=5)
+            axes.plot(
+                *line[0], "o", markersize=7, markerfacecolor=PAPER, markeredgecolor=INK, zorder=5
+            )
             note(axes, line.mean(axis=0), f"l{number} = 1 m, m{number} = 1 kg", (14, 0), ha="left")
             note(axes, line[0], f"q̇{number} = 1 rad/s", (14, 0), ha="left", color=MUTED)
-        for (name, distance), color in zip(CONTACTS.items(), (BLUE, VERMILION), strict=True):  # opposite to the motion
+        for (name, distance), color in zip(
+            CONTACTS.items(), (BLUE, VERMILION), strict=True
+        ):  # opposite to the motion
             point, normal = poses[1].of((distance, 0.0)), -poses[1].rotation[:2, 1]
             arrow(axes, point - 0.42 * normal, 0.36 * normal, color=color)
-            note(axes, point - 0.42 * normal, f"{name}, {distance} m", (-5, 0), color=color, ha="right")
-    words = ", ".join(f"{name} is {distance} m along the second link" for name, distance in CONTACTS.items())
+            note(
+                axes,
+                point - 0.42 * normal,
+                f"{name}, {distance} m",
+                (-5, 0),
+                color=color,
+                ha="right",
+            )
+    words = ", ".join(
+        f"{name} is {distance} m along the second link" for name, distance in CONTACTS.items()
+    )
     return Drawn([Panel(canvas.svg, f"Two links in a straight line from a fixed pivot; {words}.")])
 
 
@@ -128,54 +197,103 @@ def energy_loss(energies: Mapping[str, Floats]) -> Drawn:
             for reading, kinetic in zip(READINGS, ("7/3", "5"), strict=True):
                 before = energies[f"{reading}, KE0"]
                 plot.axes.plot(e, before, **line_arguments(BOUND))
-                plot.axes.plot(e, energies[f"{reading}, {contact}"], **line_arguments(STYLES[reading]), markevery=5,
-                               clip_on=False)
-                note(plot.axes, (0.0, before[0]), f"KE₀ = {kinetic} J", (2, 4), fontsize=8.5, ha="left", va="baseline")
-            plot.axes.set(xlim=(0, 1), ylim=(0, 6), xlabel="coefficient of restitution e", ylabel="KE [J]")
+                plot.axes.plot(
+                    e,
+                    energies[f"{reading}, {contact}"],
+                    **line_arguments(STYLES[reading]),
+                    markevery=5,
+                    clip_on=False,
+                )
+                note(
+                    plot.axes,
+                    (0.0, before[0]),
+                    f"KE₀ = {kinetic} J",
+                    (2, 4),
+                    fontsize=8.5,
+                    ha="left",
+                    va="baseline",
+                )
+            plot.axes.set(
+                xlim=(0, 1), ylim=(0, 6), xlabel="coefficient of restitution e", ylabel="KE [J]"
+            )
         rods, masses = (energies[f"{reading}, {contact}"][0] for reading in READINGS)
-        panels.append(Panel(plot.svg, (
-            f"Kinetic energy after a collision at {contact} over the coefficient of restitution. At e = 0 uniform rods "
-            f"keep {rods:.4f} J of 2.3333 J, point masses {masses:.4f} J of 5 J; at e = 1 all of it is kept."),
-            f"({letter}) Collision at {contact}, {CONTACTS[contact]} m along the second link"))  # fmt: skip
+        panels.append(
+            Panel(
+                plot.svg,
+                (
+                    f"Kinetic energy after a collision at {contact} over the coefficient of "
+                    f"restitution. At e = 0 uniform rods "
+                    f"keep {rods:.4f} J of 2.3333 J, point masses {masses:.4f} J of 5 J; at e = 1 "
+                    f"all of it is kept."
+                ),
+                f"({letter}) Collision at {contact}, {CONTACTS[contact]} m along the second link",
+            )
+        )
     shown = [int(np.argmin(abs(e - at))) for at in (0.0, 0.25, 0.5, 0.75, 1.0)]
     series = [f"{reading}, {contact}" for reading in READINGS for contact in CONTACTS]
     rows = tuple((float(e[k]), *(float(energies[name][k]) for name in series)) for k in shown)
     told = "KE₀ is 7/3 J for uniform rods and 5 J for point masses at the far ends of the links."
     numbers = titled(("e", *(f"{name} [J]" for name in series)), rows, digits=6, note=told)
-    return Drawn(panels, numbers, {name: STYLES[name] for name in READINGS} | {"before the collision, KE₀": BOUND})
+    return Drawn(
+        panels,
+        numbers,
+        {name: STYLES[name] for name in READINGS} | {"before the collision, KE₀": BOUND},
+    )
 
 
 @recipe("fig04", "scene/peg_corner")
 def peg_corner(scene: Mapping[str, Any]) -> Drawn:
     """Draw the peg at its start, from the resolved scene."""
     low, high = bounds([*body_outlines(scene), np.zeros((1, 2))], 0.12)
-    low, high = np.minimum(low, -_WALL), np.maximum(high, _WALL)  # x to the left, y down: show some of both walls
+    low, high = (
+        np.minimum(low, -_WALL),
+        np.maximum(high, _WALL),
+    )  # x to the left, y down: show some of both walls
     with Canvas("fig04", low, high, turned=True) as canvas:
         canvas.walls(scene)
         canvas.bodies(scene)
-        center, force = (np.asarray(each[:2]) for each in (scene["bodies"][0]["position"], scene["hand"]["force"]))
+        center, force = (
+            np.asarray(each[:2])
+            for each in (scene["bodies"][0]["position"], scene["hand"]["force"])
+        )
         arrow(canvas.axes, center, _ARROW * force)
         note(canvas.axes, center + _ARROW * force, "F hand", (6, -8), ha="left")
-        for vector, name, offset in (((_AXIS, 0), "x", (0, 7)), ((0, _AXIS), "y", (7, 2))):  # axes of the world
+        for vector, name, offset in (
+            ((_AXIS, 0), "x", (0, 7)),
+            ((0, _AXIS), "y", (7, 2)),
+        ):  # axes of the world
             arrow(canvas.axes, (0.0, 0.0), vector, color=MUTED, width=1.1, head=7)
             note(canvas.axes, vector, name, offset, color=MUTED)
         canvas.scale_bar((high[0] - 0.002, high[1] - 0.003), 0.01, "10 mm")
-    panel = Panel(canvas.svg, "A small tilted rectangle above a floor and left of a wall, with the hand's force "
-                  "pointing to the lower right.")  # fmt: skip
+    panel = Panel(
+        canvas.svg,
+        "A small tilted rectangle above a floor and left of a wall, with the hand's force "
+        "pointing to the lower right.",
+    )
     body, contact = scene["bodies"][0], scene["contact"]
     x, y, angle = body["position"]
     given = (
         ("peg size [mm]", [1e3 * side for side in body["shapes"][0]["size"]], "paper"),
         ("peg mass [kg], inertia [kg m²]", (body["mass"], body["inertia"]), "paper"),
         ("peg starts at x, y [mm], θ [rad]", (1e3 * x, 1e3 * y, angle), "ours"),
-        ("wall stiffness [N/m], damping [N s/m]", (contact["stiffness"], contact["damping"]), "paper"),
+        (
+            "wall stiffness [N/m], damping [N s/m]",
+            (contact["stiffness"], contact["damping"]),
+            "paper",
+        ),
         ("restitution", [contact["restitution"]], "paper"),
-        ("friction, its velocity threshold [m/s]", (contact["friction"], contact["friction_velocity"]), "ours"),
+        (
+            "friction, its velocity threshold [m/s]",
+            (contact["friction"], contact["friction_velocity"]),
+            "ours",
+        ),
         ("hand force [N, N, N m]", scene["hand"]["force"], "paper"),
         ("rate [Hz]", [scene["rate"]], "paper"),
     )
-    rows = tuple((quantity, ", ".join(f"{value:g}" for value in values).replace("-", MINUS), by)
-                 for quantity, values, by in given)  # fmt: skip
+    rows = tuple(
+        (quantity, ", ".join(f"{value:g}" for value in values).replace("-", MINUS), by)
+        for quantity, values, by in given
+    )
     return Drawn([panel], titled(("quantity", "value", "given by"), rows))
 
 
@@ -183,59 +301,169 @@ def peg_corner(scene: Mapping[str, Any]) -> Drawn:
 def couplings(scene: Mapping[str, Any]) -> Drawn:
     """Draw both diagrams; the table repeats the scene's gains."""
     size = (5.0, 5.0 * _BOARD[1][1] / _BOARD[1][0])
-    with Canvas("fig05-unilateral", *_BOARD, size) as one, Canvas("fig05-four", *_BOARD, size) as four:
-        tools = (one.axes, "virtual tool,\nrigid contacts", GREEN), (four.axes, "virtual tool", BLUE)
+    with (
+        Canvas("fig05-unilateral", *_BOARD, size) as one,
+        Canvas("fig05-four", *_BOARD, size) as four,
+    ):
+        tools = (
+            (one.axes, "virtual tool,\nrigid contacts", GREEN),
+            (four.axes, "virtual tool", BLUE),
+        )
         for axes, tool, color in tools:
             _block(axes, (2.05, 2.6), "device", (1.6, 1.3))
             _block(axes, (7.0, 2.6), tool, (1.7, 1.3))
-            for left, right in ((2.85, 3.75), (5.25, 6.15)):  # the two directions of the spring and damper
+            for left, right in (
+                (2.85, 3.75),
+                (5.25, 6.15),
+            ):  # the two directions of the spring and damper
                 for end in (left, right):
                     _wire(axes, [((left + right) / 2, 2.6), (end, 2.6)], color=color)
-        _block(one.axes, (4.5, 2.6), "K cpl\nB cpl", (1.5, 1.1), facecolor="none", edgecolor=MUTED,
-               linestyle=(0, (4, 2)))
-        one.axes.text(4.5, 1.78, "only in contact", ha="center", va="center", fontsize=8.5, color=GREEN)
-        _wire(one.axes, [(0.6, 4.35), (0.6, 2.6), (1.25, 2.6)], "hand force", (0.75, 4.3), color=FORCE, align="left")
-        _wire(one.axes, [(2.05, 1.95), (2.05, 0.85), (7.0, 0.85), (7.0, 1.95)], "free motion: the tool follows",
-              (4.5, 0.62), linestyle=(0, (4, 2)))
+        _block(
+            one.axes,
+            (4.5, 2.6),
+            "K cpl\nB cpl",
+            (1.5, 1.1),
+            facecolor="none",
+            edgecolor=MUTED,
+            linestyle=(0, (4, 2)),
+        )
+        one.axes.text(
+            4.5, 1.78, "only in contact", ha="center", va="center", fontsize=8.5, color=GREEN
+        )
+        _wire(
+            one.axes,
+            [(0.6, 4.35), (0.6, 2.6), (1.25, 2.6)],
+            "hand force",
+            (0.75, 4.3),
+            color=FORCE,
+            align="left",
+        )
+        _wire(
+            one.axes,
+            [(2.05, 1.95), (2.05, 0.85), (7.0, 0.85), (7.0, 1.95)],
+            "free motion: the tool follows",
+            (4.5, 0.62),
+            linestyle=(0, (4, 2)),
+        )
         _block(four.axes, (4.5, 2.6), "K coord\nB coord", (1.5, 1.1), facecolor="none")
-        four.axes.plot(0.6, 2.6, "o", markersize=17.6, markerfacecolor="none", markeredgecolor=INK, markeredgewidth=1.1)
-        four.axes.text(0.6, 2.6, "+", ha="center", va="center", fontsize=9, zorder=4)  # forces are added
-        _wire(four.axes, [(0.6, 4.9), (0.6, 2.8)], "hand force", (0.75, 4.85), color=FORCE, align="left")
-        _wire(four.axes, [(0.6, 4.35), (7.0, 4.35), (7.0, 3.25)], "hand force channel", (4.1, 4.55), color=FORCE)
+        four.axes.plot(
+            0.6,
+            2.6,
+            "o",
+            markersize=17.6,
+            markerfacecolor="none",
+            markeredgecolor=INK,
+            markeredgewidth=1.1,
+        )
+        four.axes.text(
+            0.6, 2.6, "+", ha="center", va="center", fontsize=9, zorder=4
+        )  # forces are added
+        _wire(
+            four.axes,
+            [(0.6, 4.9), (0.6, 2.8)],
+            "hand force",
+            (0.75, 4.85),
+            color=FORCE,
+            align="left",
+        )
+        _wire(
+            four.axes,
+            [(0.6, 4.35), (7.0, 4.35), (7.0, 3.25)],
+            "hand force channel",
+            (4.1, 4.55),
+            color=FORCE,
+        )
         _wire(four.axes, [(0.8, 2.6), (1.25, 2.6)])
-        _wire(four.axes, [(7.0, 1.95), (7.0, 0.85), (0.6, 0.85), (0.6, 2.4)], "environment force channel", (4.1, 0.62),
-              color=FORCE)
+        _wire(
+            four.axes,
+            [(7.0, 1.95), (7.0, 0.85), (0.6, 0.85), (0.6, 2.4)],
+            "environment force channel",
+            (4.1, 0.62),
+            color=FORCE,
+        )
     panels = (
-        Panel(one.svg, "The hand pushes the device only; a spring and damper joins device and tool while the tool is "
-              "in contact.", "(a) unilateral coupler: CBuc"),
-        Panel(four.svg, "The hand pushes device and tool alike; the environment force of the tool goes to the device; "
-              "a spring and damper joins device and tool.", "(b) four channels: ideal, IAPB, PB"),
-    )  # fmt: skip
-    names = {"four_channel": ("K_coord (four channels)", "B_coord (four channels)"),
-             "unilateral": ("K_cpl (unilateral coupler)", "B_cpl (unilateral coupler)")}
-    rows = tuple((name, *map(float, scene["couplings"][coupling][gain]), unit) for coupling, both in names.items()
-                 for name, gain, unit in zip(both, ("stiffness", "damping"), ("N/m, N m/rad", "N s/m, N m s/rad"),
-                                             strict=True))  # fmt: skip
+        Panel(
+            one.svg,
+            "The hand pushes the device only; a spring and damper joins device and tool while the "
+            "tool is "
+            "in contact.",
+            "(a) unilateral coupler: CBuc",
+        ),
+        Panel(
+            four.svg,
+            "The hand pushes device and tool alike; the environment force of the tool goes to the "
+            "device; "
+            "a spring and damper joins device and tool.",
+            "(b) four channels: ideal, IAPB, PB",
+        ),
+    )
+    names = {
+        "four_channel": ("K_coord (four channels)", "B_coord (four channels)"),
+        "unilateral": ("K_cpl (unilateral coupler)", "B_cpl (unilateral coupler)"),
+    }
+    rows = tuple(
+        (name, *map(float, scene["couplings"][coupling][gain]), unit)
+        for coupling, both in names.items()
+        for name, gain, unit in zip(
+            both, ("stiffness", "damping"), ("N/m, N m/rad", "N s/m, N m s/rad"), strict=True
+        )
+    )
     return Drawn(panels, titled(("Table I", "x", "y", "θ", "unit"), rows))
 
 
-def _block(axes: Any, center: tuple[float, float], text: str, size: tuple[float, float], **how: Any) -> None:
+def _block(
+    axes: Any, center: tuple[float, float], text: str, size: tuple[float, float], **how: Any
+) -> None:
     """Draw a box with text in it."""
     from matplotlib.patches import FancyBboxPatch
 
     x, y = center[0] - size[0] / 2, center[1] - size[1] / 2
-    axes.add_patch(FancyBboxPatch((x, y), *size, boxstyle="round,pad=0,rounding_size=0.12", linewidth=1.1, zorder=3,
-                                  **{"facecolor": PEG, "edgecolor": INK, **how}))
+    axes.add_patch(
+        FancyBboxPatch(
+            (x, y),
+            *size,
+            boxstyle="round,pad=0,rounding_size=0.12",
+            linewidth=1.1,
+            zorder=3,
+            **{"facecolor": PEG, "edgecolor": INK, **how},
+        )
+    )
     axes.text(*center, text, ha="center", va="center", fontsize=9, zorder=4, linespacing=1.35)
 
 
-def _wire(axes: Any, corners: Sequence[tuple[float, float]], text: str = "", at: tuple[float, float] = (0, 0), *,
-          color: str = INK, align: str = "center", **how: Any) -> None:  # fmt: skip
+def _wire(
+    axes: Any,
+    corners: Sequence[tuple[float, float]],
+    text: str = "",
+    at: tuple[float, float] = (0, 0),
+    *,
+    color: str = INK,
+    align: str = "center",
+    **how: Any,
+) -> None:
     """Draw a signal along `corners` with an arrow head at its end, and its name at `at`."""
-    axes.plot(*zip(*corners, strict=True), color=color, linewidth=1.2, solid_capstyle="butt", zorder=2, **how)
-    axes.annotate("", xy=corners[-1], xytext=corners[-2], zorder=2,
-                  arrowprops={"arrowstyle": "-|>", "color": color, "linewidth": 0, "mutation_scale": 10,
-                              "shrinkA": 0, "shrinkB": 0})
+    axes.plot(
+        *zip(*corners, strict=True),
+        color=color,
+        linewidth=1.2,
+        solid_capstyle="butt",
+        zorder=2,
+        **how,
+    )
+    axes.annotate(
+        "",
+        xy=corners[-1],
+        xytext=corners[-2],
+        zorder=2,
+        arrowprops={
+            "arrowstyle": "-|>",
+            "color": color,
+            "linewidth": 0,
+            "mutation_scale": 10,
+            "shrinkA": 0,
+            "shrinkB": 0,
+        },
+    )
     axes.text(*at, text, ha=align, va="center", fontsize=8.5, color=color, zorder=4)
 
 
@@ -246,8 +474,13 @@ def gallery(*scenes: Mapping[str, Any]) -> Drawn:
     for scene in scenes:
         low, high = bounds(body_outlines(scene), 0.25)
         reach = max(high - low)
-        with Canvas(f"scenes-{scene['name']}", low - 0.35 * reach, high + 0.35 * reach, PANEL,
-                    turned=is_turned(scene)) as canvas:  # fmt: skip
+        with Canvas(
+            f"scenes-{scene['name']}",
+            low - 0.35 * reach,
+            high + 0.35 * reach,
+            PANEL,
+            turned=is_turned(scene),
+        ) as canvas:
             canvas.walls(scene, 20 * reach)
             canvas.bodies(scene)
             canvas.hand(scene, None, 0.28 * reach)

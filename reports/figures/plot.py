@@ -1,4 +1,5 @@
-"""One drawing: axes in the report's style, pictures of scenes in the plane, and the SVG, the same bytes each time."""
+"""One drawing: axes in the report's style, pictures of scenes in the plane, and the SVG, the same
+bytes each time."""
 
 from __future__ import annotations
 
@@ -27,7 +28,9 @@ from reports.figures.style import (
 )
 
 TIME, PATH = "time", "path"  # the cursor reads curves over time
-TOLERANCE = 0.01  # points, 1/30000 of the width of a panel: peaks and corners stay, straight runs go
+TOLERANCE = (
+    0.01  # points, 1/30000 of the width of a panel: peaks and corners stay, straight runs go
+)
 _ASIDE = 9.0  # points from an arrow to its name
 _SIDEWAYS = 0.3  # horizontal share of the way to the name from which the name begins there
 LARGEST_ENLARGEMENT = 1.35  # wider drawings would have too large letters
@@ -52,8 +55,16 @@ class Plot:
     svg : the SVG of the panel
     """
 
-    def __init__(self, key: str, size: tuple[float, float] = PANEL, *, kind: str = "", bare: bool = False,
-                 shape: tuple[int, int] = (1, 1), frames: Sequence[Sequence[float]] = ()) -> None:  # fmt: skip
+    def __init__(
+        self,
+        key: str,
+        size: tuple[float, float] = PANEL,
+        *,
+        kind: str = "",
+        bare: bool = False,
+        shape: tuple[int, int] = (1, 1),
+        frames: Sequence[Sequence[float]] = (),
+    ) -> None:
         self.key, self.size, self.kind, self.bare, self.shape = key, size, kind, bare, shape
         self.frames = frames or ([(0.0, 0.0, 1.0, 1.0)] if bare else [])
         self.svg = ""
@@ -67,17 +78,26 @@ class Plot:
 
         self._style = matplotlib.rc_context(PARAMETERS)
         self._style.__enter__()
-        self.drawing = Figure(figsize=self.size, dpi=72, layout=None if self.frames else "constrained")
-        self.each = ([self.drawing.add_axes(frame) for frame in self.frames] if self.frames else
-                     list(self.drawing.subplots(*self.shape, squeeze=False).ravel()))  # fmt: skip
+        self.drawing = Figure(
+            figsize=self.size, dpi=72, layout=None if self.frames else "constrained"
+        )
+        self.each = (
+            [self.drawing.add_axes(frame) for frame in self.frames]
+            if self.frames
+            else list(self.drawing.subplots(*self.shape, squeeze=False).ravel())
+        )
         self.axes = self.each[0]
         if self.bare:
             for axes in self.each:
                 axes.set_axis_off()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: TracebackType | None) -> None:  # fmt: skip
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         if error is None:
             if self.words:
                 self._add_legend()
@@ -92,7 +112,8 @@ class Plot:
         self.drawing.legend(lines, texts, loc="outside upper left", fontsize=8)
 
     def _traced(self) -> str:
-        """Return the SVG with what the page's script reads values with: the frame in points, limits and names."""
+        """Return the SVG with what the page's script reads values with: the frame in points, limits
+        and names."""
         import matplotlib
 
         matplotlib.rcParams["path.simplify_threshold"] = TOLERANCE
@@ -100,14 +121,24 @@ class Plot:
             line.get_path().simplify_threshold = TOLERANCE
         svg = to_svg(self.drawing, self.key)
         place, (width, height) = self.axes.get_position(), 72.0 * self.drawing.get_size_inches()
-        frame = (width * place.x0, height * (1.0 - place.y1), width * place.x1, height * (1.0 - place.y0))
+        frame = (
+            width * place.x0,
+            height * (1.0 - place.y1),
+            width * place.x1,
+            height * (1.0 - place.y0),
+        )
         ranges = {"frame": frame, "x": self.axes.get_xlim(), "y": self.axes.get_ylim()}
-        told = {"trace": self.kind, "names": f"{self.axes.get_xlabel()}|{self.axes.get_ylabel()}",
-                **{key: " ".join(f"{value:.7g}" for value in values) for key, values in ranges.items()}}
+        told = {
+            "trace": self.kind,
+            "names": f"{self.axes.get_xlabel()}|{self.axes.get_ylabel()}",
+            **{key: " ".join(f"{value:.7g}" for value in values) for key, values in ranges.items()},
+        }
         attributes = " ".join(f'data-{key}="{value}"' for key, value in told.items())
         return svg.replace("<svg ", f"<svg {attributes} ", 1)
 
-    def curve(self, points: Iterable[tuple[Any, Any]], look: LineStyle, *, marked: bool = True, **how: Any) -> None:
+    def curve(
+        self, points: Iterable[tuple[Any, Any]], look: LineStyle, *, marked: bool = True, **how: Any
+    ) -> None:
         """Draw a curve through points (x, y); draw nothing if there are none."""
         points = list(points)
         if points:
@@ -119,15 +150,24 @@ class Plot:
 
     def lost(self, places: Sequence[float], look: LineStyle, height: float) -> None:
         """Draw crosses at the upper rim at the x values `places` of failed cases."""
-        self.axes.plot(places, [height] * len(places), "x", color=look.color, markersize=5,
-                       transform=self.axes.get_xaxis_transform())  # fmt: skip
+        self.axes.plot(
+            places,
+            [height] * len(places),
+            "x",
+            color=look.color,
+            markersize=5,
+            transform=self.axes.get_xaxis_transform(),
+        )
 
     def log(self, x: str, y: str, scales: str = "xy", **limits: Any) -> None:
-        """Name the axes and make those in `scales` logarithmic, with powers of ten as plain text."""
+        """Name the axes and make those in `scales` logarithmic, with powers of ten as plain
+        text."""
         from matplotlib.ticker import LogLocator, NullLocator
 
         self.axes.set(**{f"{axis}scale": "log" for axis in scales}, xlabel=x, ylabel=y, **limits)
-        for axis in (axis for axis in (self.axes.xaxis, self.axes.yaxis) if axis.get_scale() == "log"):
+        for axis in (
+            axis for axis in (self.axes.xaxis, self.axes.yaxis) if axis.get_scale() == "log"
+        ):
             axis.set_major_locator(LogLocator(numticks=7))
             axis.set_major_formatter(lambda value, _: power_of_ten(value))
             axis.set_minor_locator(NullLocator())
@@ -145,17 +185,27 @@ class Plot:
 class Canvas(Plot):
     """A panel without axes that shows at least the rectangle from `low` to `high`, at equal scales.
 
-    Without a `size` the panel has the standard width and the proportions of the rectangle. A picture that is `turned`,
-    by 180 degrees, has x to the left and y down.
+    Without a `size` the panel has the standard width and the proportions of the rectangle. A
+    picture that is `turned`, by 180 degrees, has x to the left and y down.
     """
 
-    def __init__(self, key: str, low: Floats, high: Floats, size: tuple[float, float] | None = None, *,
-                 turned: bool = False) -> None:  # fmt: skip
+    def __init__(
+        self,
+        key: str,
+        low: Floats,
+        high: Floats,
+        size: tuple[float, float] | None = None,
+        *,
+        turned: bool = False,
+    ) -> None:
         width, height = high - low
         super().__init__(key, size or (PANEL[0], PANEL[0] * height / width), bare=True)
         (left, bottom), (right, top) = widened(low, high, self.size[0] / self.size[1])
-        self.limits = {"xlim": (right, left), "ylim": (top, bottom)} if turned else {
-            "xlim": (left, right), "ylim": (bottom, top)}  # fmt: skip
+        self.limits = (
+            {"xlim": (right, left), "ylim": (top, bottom)}
+            if turned
+            else {"xlim": (left, right), "ylim": (bottom, top)}
+        )
 
     def __enter__(self) -> Canvas:
         super().__enter__()
@@ -173,13 +223,17 @@ class Canvas(Plot):
             self.axes.fill(*corners.T, facecolor=PEG, edgecolor=INK, linewidth=1.1, zorder=2)
 
     def hand(self, scene: Mapping[str, Any], pose: Floats | None, length: float) -> None:
-        """Draw the hand's force as an arrow of the given length [m] from the point that it holds."""
+        """Draw the hand's force as an arrow of the given length [m] from the point that it
+        holds."""
         if scene["hand"] and np.any(force := np.asarray(scene["hand"]["force"][:2], dtype=float)):
-            start = body_placements(scene, pose)[scene["hand"]["body"]].of(scene["hand"]["point"])[:2]
+            start = body_placements(scene, pose)[scene["hand"]["body"]].of(scene["hand"]["point"])[
+                :2
+            ]
             self.named_arrow(start, length * force / np.hypot(*force), "hand")
 
     def named_arrow(self, start: Floats, vector: Floats, name: str) -> None:
-        """Draw an arrow and its name, to the right of its middle or, if it is horizontal, above it."""
+        """Draw an arrow and its name, to the right of its middle or, if it is horizontal, above
+        it."""
         arrow(self.axes, start, vector)
         way = np.subtract(*self.axes.transData.transform([start + vector, start]))
         aside = np.array([way[1], -way[0]]) / np.hypot(*way)
@@ -195,20 +249,36 @@ class Canvas(Plot):
         note(self.axes, ends.mean(axis=0), text, (0, 6), fontsize=8.5)
 
 
-def arrow(axes: Any, tail: Any, vector: Any, *, color: str = FORCE, width: float = 1.6, head: float = 9.0) -> None:
+def arrow(
+    axes: Any, tail: Any, vector: Any, *, color: str = FORCE, width: float = 1.6, head: float = 9.0
+) -> None:
     """Draw an arrow from `tail` along `vector`."""
-    axes.annotate("", xy=tuple(np.add(tail, vector)), xytext=tuple(tail), zorder=6,
-                  arrowprops={"arrowstyle": "-|>", "color": color, "linewidth": width, "mutation_scale": head,
-                              "shrinkA": 0, "shrinkB": 0})
+    axes.annotate(
+        "",
+        xy=tuple(np.add(tail, vector)),
+        xytext=tuple(tail),
+        zorder=6,
+        arrowprops={
+            "arrowstyle": "-|>",
+            "color": color,
+            "linewidth": width,
+            "mutation_scale": head,
+            "shrinkA": 0,
+            "shrinkB": 0,
+        },
+    )
 
 
-def note(axes: Any, point: Any, text: str, offset: tuple[float, float] = (0.0, 0.0), **how: Any) -> None:
+def note(
+    axes: Any, point: Any, text: str, offset: tuple[float, float] = (0.0, 0.0), **how: Any
+) -> None:
     """Write text at a point, moved by `offset` [points]."""
     how = {"fontsize": 9, "ha": "center", "va": "center", "zorder": 7, **how}
     axes.annotate(text, tuple(point), xytext=offset, textcoords="offset points", **how)
 
 
-# SVG: without date and metadata; coordinates rounded to 0.01 pt, colours as variables of the page, text as text
+# SVG: without date and metadata; coordinates rounded to 0.01 pt, colours as variables of the page,
+# text as text
 
 _NUMBER, _COMMAND = re.compile(r"-?\d+\.\d{3,}"), re.compile(r"\s*([MLCQz])\s*")
 _MARKERS = r"(?:<use [^>]*/>)+</g>"
@@ -229,9 +299,17 @@ _CLEANED: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
     (r"(?s)(?:<metadata>.*?</metadata>|<!--.*?-->|<defs>\s*<style.*?</style>\s*</defs>)\s*", ""),
     (r'\sid="curve=([^"]*)"', r' data-curve="\1"'),  # what a gid tells the page's script
     # coordinates are inside of tags; the numbers between them are for people
-    (r"<[^>]+>", lambda tag: _NUMBER.sub(lambda number: f"{float(number[0]):.2f}".rstrip("0").rstrip("."), tag[0])),
+    (
+        r"<[^>]+>",
+        lambda tag: _NUMBER.sub(
+            lambda number: f"{float(number[0]):.2f}".rstrip("0").rstrip("."), tag[0]
+        ),
+    ),
     (r'\stransform="rotate\(-?0 [^)]*\)"', ""),
-    (r'\sd="[^"]*"', lambda path: " " + _COMMAND.sub(r"\1", path[0].strip())),  # letters part the numbers of a path
+    (
+        r'\sd="[^"]*"',
+        lambda path: " " + _COMMAND.sub(r"\1", path[0].strip()),
+    ),  # letters part the numbers of a path
     (r">\s+<", "><"),
     (rf'<g clip-path="([^"]*)">{_MARKERS}(?:<g clip-path="\1">{_MARKERS})+', _clipped_once),
     (r'<use [^>]*? style="([^"]*)"/>(?:<use [^>]*? style="\1"/>)+', _styled_once),
@@ -246,16 +324,24 @@ def to_svg(drawing: Any, key: str) -> str:
     The page sets the size, up to LARGEST_ENLARGEMENT; the viewBox keeps the proportions.
     """
     buffer = io.StringIO()
-    drawing.savefig(buffer, format="svg", bbox_inches=None,
-                    metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))  # fmt: skip
+    drawing.savefig(
+        buffer,
+        format="svg",
+        bbox_inches=None,
+        metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")),
+    )
     head, text = buffer.getvalue().split("<svg", 1)[1].split(">", 1)
     head = re.sub(r'\s(?:width|height|version|xmlns:xlink)="[^"]*"', "", head)
     widest = LARGEST_ENLARGEMENT * round(96 * drawing.get_size_inches()[0])
-    text = (f'<svg{head} xmlns:xlink="http://www.w3.org/1999/xlink" style="max-width: {widest:.0f}px">'
-            f"{text}")
+    text = (
+        f'<svg{head} xmlns:xlink="http://www.w3.org/1999/xlink" style="max-width: {widest:.0f}px">'
+        f"{text}"
+    )
     for pattern, new in _CLEANED:
         text = re.sub(pattern, new, text)
     referred = dict.fromkeys(re.findall(r'(?:url\(#|href="#)([^)"]+)', text))
     names = {old: f"{key}-{number}" for number, old in enumerate(referred)}
-    text = re.sub(r'\sid="([^"]+)"', lambda id: f' id="{names[id[1]]}"' if id[1] in names else "", text)
+    text = re.sub(
+        r'\sid="([^"]+)"', lambda id: f' id="{names[id[1]]}"' if id[1] in names else "", text
+    )
     return re.sub(r'(url\(#|href="#)([^)"]+)', lambda link: link[1] + names[link[2]], text).strip()

@@ -1,7 +1,8 @@
 """The style of the figures: one colour, line and marker per world, the same in every figure.
 
-Colours are those of Okabe and Ito (safe for colour-blind readers); line styles and markers differ as well, so that a
-grey print can be read. The page maps each colour to a variable, so that dark mode can use other colours.
+Colours are those of Okabe and Ito (safe for colour-blind readers); line styles and markers differ
+as well, so that a grey print can be read. The page maps each colour to a variable, so that dark
+mode can use other colours.
 """
 
 from __future__ import annotations
@@ -13,18 +14,38 @@ from typing import Any
 
 INK, MUTED, RULE, PAPER = "#1b1f24", "#66707b", "#d9dde2", "#fffefc"
 WALL, PEG, FORCE, LINK = "#c9cdd2", "#dbe7f1", "#b3261e", "#8fa3b5"
-BLUE, VERMILION, GREEN, PURPLE, AMBER, SKY = "#0072b2", "#d55e00", "#00896a", "#a5508a", "#b07d00", "#3a97cf"
+BLUE, VERMILION, GREEN, PURPLE, AMBER, SKY = (
+    "#0072b2",
+    "#d55e00",
+    "#00896a",
+    "#a5508a",
+    "#b07d00",
+    "#3a97cf",
+)
 
-# hex value -> name of the page's variable; the hex value itself stays the fallback outside of the page
+# hex value -> name of the page's variable; the hex value itself stays the fallback outside of the
+# page
 VARIABLES = {
-    INK: "ink", MUTED: "muted", RULE: "rule", PAPER: "paper", WALL: "wall", PEG: "peg", FORCE: "force",
-    LINK: "link-body", BLUE: "blue", VERMILION: "vermilion", GREEN: "green", PURPLE: "purple", AMBER: "amber",
+    INK: "ink",
+    MUTED: "muted",
+    RULE: "rule",
+    PAPER: "paper",
+    WALL: "wall",
+    PEG: "peg",
+    FORCE: "force",
+    LINK: "link-body",
+    BLUE: "blue",
+    VERMILION: "vermilion",
+    GREEN: "green",
+    PURPLE: "purple",
+    AMBER: "amber",
     SKY: "sky",
 }
 
 
 def css(color: str) -> str:
-    """Return a colour of this table as CSS: the page's variable, with the colour itself as fallback."""
+    """Return a colour of this table as CSS: the page's variable, with the colour itself as
+    fallback."""
     return f"var(--{VARIABLES[color]}, {color})"
 
 
@@ -40,8 +61,9 @@ class LineStyle:
     name: str = ""  # name of the curve, in the drawing and in its legend
 
 
-# One row per method, world or quantity: the names that figures give it, and its style. All styles differ, and each
-# method, world or quantity has the same style in every figure. No other row has the colour and marker of a world.
+# One row per method, world or quantity: the names that figures give it, and its style. All styles
+# differ, and each method, world or quantity has the same style in every figure. No other row has
+# the colour and marker of a world.
 LOOKS: tuple[tuple[tuple[str, ...], LineStyle], ...] = (
     # the worlds of the paper and of this project
     (("ideal",), LineStyle(INK, "", (), 2.4)),
@@ -58,8 +80,7 @@ LOOKS: tuple[tuple[tuple[str, ...], LineStyle], ...] = (
     # methods for an impact and solvers; what Python calls is dashed, its marks empty
     (("IAPB, Python",), LineStyle(BLUE, "o", (4, 2), 1.2, filled=False)),
     (("factored, no clamp",), LineStyle(SKY, "s", (5, 1.6))),
-    (("printed, numpy", "gram_pinv", "gram_pinv, as printed"),
-     LineStyle(PURPLE, "s", (4, 2), 1.4)),
+    (("printed, numpy", "gram_pinv", "gram_pinv, as printed"), LineStyle(PURPLE, "s", (4, 2), 1.4)),
     (("Gauss-Seidel",), LineStyle(VERMILION, "v", (), 1.4)),
     (("Lemke",), LineStyle(GREEN, "<", (), 1.4)),
     (("DAQP, Python",), LineStyle(AMBER, "D", (4, 2), 1.2, filled=False)),
@@ -74,8 +95,10 @@ LOOKS: tuple[tuple[tuple[str, ...], LineStyle], ...] = (
     # Figure 3
     (("uniform rods",), LineStyle(SKY, "o", (), 1.8)),
     (("point masses",), LineStyle(PURPLE, "o", (5, 1.6), 1.5, filled=False)),
-)  # fmt: skip
-STYLES: dict[str, LineStyle] = {name: replace(look, name=name) for names, look in LOOKS for name in names}
+)
+STYLES: dict[str, LineStyle] = {
+    name: replace(look, name=name) for names, look in LOOKS for name in names
+}
 
 BOUND = LineStyle(INK, "", (4, 2), 1.2)  # what is measured against: a bound, the value before
 
@@ -88,25 +111,62 @@ OUTCOMES: dict[str, LineStyle] = {
 
 # series that are ours to number: sizes, scenes, filters; none looks like a world
 CYCLE = (
-    LineStyle(SKY, "o"), LineStyle(AMBER, "s", (5, 1.6)), LineStyle(PURPLE, "^", (1.4, 1.4)),
-    LineStyle(MUTED, "D", (6, 1.6, 1.4, 1.6)), LineStyle(BLUE, "v"), LineStyle(VERMILION, "P", (3, 1.2)),
-    LineStyle(INK, "X", (1, 1)), LineStyle(GREEN, "*", (4, 1, 1, 1)), LineStyle(AMBER, "<", (8, 2)),
+    LineStyle(SKY, "o"),
+    LineStyle(AMBER, "s", (5, 1.6)),
+    LineStyle(PURPLE, "^", (1.4, 1.4)),
+    LineStyle(MUTED, "D", (6, 1.6, 1.4, 1.6)),
+    LineStyle(BLUE, "v"),
+    LineStyle(VERMILION, "P", (3, 1.2)),
+    LineStyle(INK, "X", (1, 1)),
+    LineStyle(GREEN, "*", (4, 1, 1, 1)),
+    LineStyle(AMBER, "<", (8, 2)),
     LineStyle(PURPLE, ">", (8, 2, 1, 2)),
 )
 
 PARAMETERS: Any = {
-    "svg.hashsalt": "iapb", "svg.fonttype": "none", "path.simplify": True, "path.simplify_threshold": 0.15,
-    "font.family": ["DejaVu Sans"], "font.size": 9.0, "axes.labelsize": 9.0, "xtick.labelsize": 8.5,
-    "ytick.labelsize": 8.5, "axes.titlesize": 9.5, "axes.titleweight": "normal", "axes.titlelocation": "left",
-    "text.color": INK, "axes.labelcolor": INK, "xtick.color": MUTED, "ytick.color": MUTED,
-    "xtick.labelcolor": INK, "ytick.labelcolor": INK,
-    "axes.edgecolor": MUTED, "axes.linewidth": 0.7, "axes.facecolor": "none", "figure.facecolor": "none",
-    "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "grid.color": RULE,
-    "grid.linewidth": 0.6, "axes.axisbelow": True, "xtick.major.size": 3, "ytick.major.size": 3,
-    "xtick.major.width": 0.7, "ytick.major.width": 0.7, "lines.solid_capstyle": "round",
-    "lines.solid_joinstyle": "round", "legend.frameon": False, "axes.unicode_minus": True,
-    "axes.formatter.useoffset": False, "axes.formatter.limits": (-4, 5), "axes.formatter.use_mathtext": False,
-    "axes.xmargin": 0.02, "axes.ymargin": 0.06, "hatch.linewidth": 0.6, "hatch.color": MUTED,
+    "svg.hashsalt": "iapb",
+    "svg.fonttype": "none",
+    "path.simplify": True,
+    "path.simplify_threshold": 0.15,
+    "font.family": ["DejaVu Sans"],
+    "font.size": 9.0,
+    "axes.labelsize": 9.0,
+    "xtick.labelsize": 8.5,
+    "ytick.labelsize": 8.5,
+    "axes.titlesize": 9.5,
+    "axes.titleweight": "normal",
+    "axes.titlelocation": "left",
+    "text.color": INK,
+    "axes.labelcolor": INK,
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "axes.edgecolor": MUTED,
+    "axes.linewidth": 0.7,
+    "axes.facecolor": "none",
+    "figure.facecolor": "none",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": RULE,
+    "grid.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "xtick.major.size": 3,
+    "ytick.major.size": 3,
+    "xtick.major.width": 0.7,
+    "ytick.major.width": 0.7,
+    "lines.solid_capstyle": "round",
+    "lines.solid_joinstyle": "round",
+    "legend.frameon": False,
+    "axes.unicode_minus": True,
+    "axes.formatter.useoffset": False,
+    "axes.formatter.limits": (-4, 5),
+    "axes.formatter.use_mathtext": False,
+    "axes.xmargin": 0.02,
+    "axes.ymargin": 0.06,
+    "hatch.linewidth": 0.6,
+    "hatch.color": MUTED,
 }
 
 PANEL = (4.1, 3.0)  # inches: two or three of them stand beside each other on a desk, one on a phone
@@ -115,7 +175,10 @@ PANEL = (4.1, 3.0)  # inches: two or three of them stand beside each other on a 
 def looks_of(names: Iterable[str]) -> dict[str, LineStyle]:
     """Return the style of each name: its own style if it has one, else the next numbered style."""
     numbers = count()
-    return {name: STYLES[name] if name in STYLES else numbered(next(numbers), name) for name in dict.fromkeys(names)}
+    return {
+        name: STYLES[name] if name in STYLES else numbered(next(numbers), name)
+        for name in dict.fromkeys(names)
+    }
 
 
 def numbered(number: int, name: str = "") -> LineStyle:

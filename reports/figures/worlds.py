@@ -1,4 +1,5 @@
-"""One scene in several worlds: distances from one of them, energy and penetration over time, and the time of a step."""
+"""One scene in several worlds: distances from one of them, energy and penetration over time, and
+the time of a step."""
 
 from __future__ import annotations
 
@@ -11,21 +12,26 @@ from reports.figures.style import LineStyle, line_arguments, looks_of
 from verification.table import Table
 
 _DISTANCES = ("configuration", "velocity", "impulse")  # zero in the reference world
-_LINEAR = 30.0  # largest ratio of peaks that an even scale shows; beyond, distances are on a logarithmic one
+# largest ratio of peaks that an even scale shows; beyond, distances are on a logarithmic one
+_LINEAR = 30.0
 _ROUNDING = 1e-9  # share of the largest peak under which a curve is rounding and need not be seen
 # column of the table over time -> (title, factor to what is drawn)
 _PANELS = {
-    "configuration": ("configuration apart [mm]", 1e3), "velocity": ("velocity apart [mm/s]", 1e3),
-    "impulse": ("impulse of contacts apart [N s]", 1.0), "energy": ("kinetic and potential energy [J]", 1.0),
+    "configuration": ("configuration apart [mm]", 1e3),
+    "velocity": ("velocity apart [mm/s]", 1e3),
+    "impulse": ("impulse of contacts apart [N s]", 1.0),
+    "energy": ("kinetic and potential energy [J]", 1.0),
     "penetration": ("penetration [mm]", 1e3),
-}  # fmt: skip
+}
 
 
 @recipe("worlds", "worlds", "over time")
 def worlds(table: Table, series: Table) -> Drawn:
     """Draw five curves over time for each world, and bars of the time of a step."""
     names = [str(name) for name in table.column("world")]
-    against = next((row["world"] for row in table.records() if row["configuration, rms"] is None), "")
+    against = next(
+        (row["world"] for row in table.records() if row["configuration, rms"] is None), ""
+    )
     looks = looks_of(names)
     with Plot("worlds", (9.6, 5.4), shape=(2, 3)) as plot:
         for axes, (key, (title, factor)) in zip(plot.each, _PANELS.items(), strict=False):
@@ -33,11 +39,23 @@ def worlds(table: Table, series: Table) -> Drawn:
             shown = [name for name in shown if None not in series.where(world=name).column(key)]
             _curves(axes, series, key, factor, {name: looks[name] for name in shown})
             axes.set(title=title, xlabel="time [s]")
-        bars, spent = plot.each[5], dict(zip(table.column("world"), table.column("time per step"), strict=True))
-        drawn = bars.barh(list(spent), list(spent.values()), color=[looks[name].color for name in spent], height=0.6)
+        bars, spent = (
+            plot.each[5],
+            dict(zip(table.column("world"), table.column("time per step"), strict=True)),
+        )
+        drawn = bars.barh(
+            list(spent),
+            list(spent.values()),
+            color=[looks[name].color for name in spent],
+            height=0.6,
+        )
         bars.bar_label(drawn, [f"{value:.3g}" for value in spent.values()], padding=3)
-        bars.set(xscale="log", title="time of a step [µs]", xticks=[],
-                 xlim=(0.5 * min(spent.values()), 8.0 * max(spent.values())))  # fmt: skip
+        bars.set(
+            xscale="log",
+            title="time of a step [µs]",
+            xticks=[],
+            xlim=(0.5 * min(spent.values()), 8.0 * max(spent.values())),
+        )
         bars.minorticks_off()
         bars.invert_yaxis()
     alt = f"Worlds {', '.join(names)} over time: {'; '.join(title for title, _ in _PANELS.values())}; time per step."

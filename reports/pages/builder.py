@@ -1,4 +1,5 @@
-"""Fill the templates with records and figures: a first page and one page for each section, all self-contained."""
+"""Fill the templates with records and figures: a first page and one page for each section, all
+self-contained."""
 
 from __future__ import annotations
 
@@ -35,18 +36,41 @@ from verification.table import Table
 FIRST_PAGE = "report.html"
 # Largest number of table rows on a page, to keep it small; numbers.json has all of them.
 ROWS_SHOWN = 200
-# The mark of each verdict, of each kind of outcome of a claim, and of the parts that decide nothing. Marks differ in
-# shape as well as in colour.
+# The mark of each verdict, of each kind of outcome of a claim, and of the parts that decide
+# nothing. Marks differ in shape as well as in colour.
 OUTCOMES = (*finding.VERDICTS, *finding.KINDS, finding.MISPRINT, finding.BEYOND)
 OUTCOME_MARKS = dict(zip(OUTCOMES, "✓◐≈✕○…" + "✓✓◐≈✕○…" + "≠·", strict=True))
-OUTCOME_CLASSES = dict(zip(OUTCOMES, (
-    "good", "where", "limited", "bad", "open", "absent", "good", "good", "where", "limited", "bad", "open", "absent",
-    "limited", "open"), strict=True))  # fmt: skip
-FINDINGS = finding.IN_WORDS | {finding.MIXED: "holds in part"}  # in words, for checks that are no claims
+OUTCOME_CLASSES = dict(
+    zip(
+        OUTCOMES,
+        (
+            "good",
+            "where",
+            "limited",
+            "bad",
+            "open",
+            "absent",
+            "good",
+            "good",
+            "where",
+            "limited",
+            "bad",
+            "open",
+            "absent",
+            "limited",
+            "open",
+        ),
+        strict=True,
+    )
+)
+FINDINGS = finding.IN_WORDS | {
+    finding.MIXED: "holds in part"
+}  # in words, for checks that are no claims
 
 
-def draw_all(evidence: Evidence, recipes: Iterable[Recipe] = RECIPES, failures: list[Failure] | None = None
-             ) -> list[Figure]:  # fmt: skip
+def draw_all(
+    evidence: Evidence, recipes: Iterable[Recipe] = RECIPES, failures: list[Failure] | None = None
+) -> list[Figure]:
     """Draw the figures of a report; see `draw` for those that cannot be drawn."""
     inputs = figure_inputs(evidence)
     return [draw(recipe, inputs, failures) for recipe in recipes]
@@ -55,30 +79,49 @@ def draw_all(evidence: Evidence, recipes: Iterable[Recipe] = RECIPES, failures: 
 def build_report(evidence: Evidence, drawn: Iterable[Figure] = ()) -> dict[str, str]:
     """Return the HTML of the first page and of each section by file name, FIRST_PAGE first.
 
-    Missing evidence is printed as "not computed in this run". Every page links to the others and needs neither network
-    nor script.
+    Missing evidence is printed as "not computed in this run". Every page links to the others and
+    needs neither network nor script.
     """
     figures: dict[str, list[Figure]] = {}
     for figure in drawn:
         figures.setdefault(figure.section, []).append(figure)
     environment = _environment()
-    text = "(() => {\n\"use strict\";\n" + files(__package__).joinpath("scripts/page.js").read_text("utf-8") + "})();\n"
+    text = (
+        '(() => {\n"use strict";\n'
+        + files(__package__).joinpath("scripts/page.js").read_text("utf-8")
+        + "})();\n"
+    )
     digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
-    # The browser runs only this script and makes no requests; without the script the page is complete.
+    # The browser runs only this script and makes no requests; without the script the page is
+    # complete.
     policy = f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'"
     shared = {
-        "script": Markup(text), "policy": policy, "evidence": evidence, "figures": figures,
+        "script": Markup(text),
+        "policy": policy,
+        "evidence": evidence,
+        "figures": figures,
         "run_counts": Counter(user for run in evidence.runs for user in run.used_by),
-        "groups": [(group, list(found)) for group, found in groupby(SECTIONS, key=lambda section: section.group)],
-    }  # fmt: skip
+        "groups": [
+            (group, list(found))
+            for group, found in groupby(SECTIONS, key=lambda section: section.group)
+        ],
+    }
     first = environment.get_template("first.html.j2").render(
-        shared, facts=facts(evidence), made_from=made_from(evidence), first_map=first_map(evidence.claims), next=NEXT,
+        shared,
+        facts=facts(evidence),
+        made_from=made_from(evidence),
+        first_map=first_map(evidence.claims),
+        next=NEXT,
         later=LATER,
-    )  # fmt: skip
+    )
     maps = {claim.key: map_of(claim) for claim in evidence.claims}
     layout = environment.get_template("section.html.j2")
-    pages = {section.page: layout.render(shared, section=section, maps=maps) for section in SECTIONS}
-    return {name: explained(page) for name, page in link_across({FIRST_PAGE: first} | pages).items()}
+    pages = {
+        section.page: layout.render(shared, section=section, maps=maps) for section in SECTIONS
+    }
+    return {
+        name: explained(page) for name, page in link_across({FIRST_PAGE: first} | pages).items()
+    }
 
 
 def link_across(pages: Mapping[str, str]) -> dict[str, str]:
@@ -104,24 +147,32 @@ def link_across(pages: Mapping[str, str]) -> dict[str, str]:
 
 
 def figure_inputs(evidence: Evidence) -> dict[str, Any]:
-    """Return all possible inputs of figures by name: runs, scenes, and the tables of claims and topics."""
+    """Return all possible inputs of figures by name: runs, scenes, and the tables of claims and
+    topics."""
     scenes = {f"scene/{name}": scene for name, scene in evidence.scenes.items()}
-    tables = {f"{topic.key}/{name}": table for topic in (*evidence.claims, *evidence.topics)
-              for name, table in topic.tables.items()}
+    tables = {
+        f"{topic.key}/{name}": table
+        for topic in (*evidence.claims, *evidence.topics)
+        for name, table in topic.tables.items()
+    }
     return {**scenes, **tables, **evidence.inputs}
 
 
 def map_of(claim: Finding) -> Figure | None:
-    """Return a map of where a claim holds, over its two decisive conditions; None if it holds everywhere."""
+    """Return a map of where a claim holds, over its two decisive conditions; None if it holds
+    everywhere."""
     table = claim.tables.get(claim.key)
     if not claim.axes or claim.verdict == finding.REPRODUCED or table is None or not table.rows:
         return None
     caption = f"Each place is a pair of values of the axes; smaller dot: {claim.key} holds in only some trials there."
-    return condition_map(f"map-{claim.key}", f"Where {claim.key} holds", caption, table, *claim.axes)
+    return condition_map(
+        f"map-{claim.key}", f"Where {claim.key} holds", caption, table, *claim.axes
+    )
 
 
 def first_map(claims: Sequence[Finding]) -> Figure | None:
-    """Return the first page's map of where C10 holds, start by start on the full grid; None if not computed."""
+    """Return the first page's map of where C10 holds, start by start on the full grid; None if not
+    computed."""
     table = next((claim.tables.get(claim.key) for claim in claims if claim.key == "C10"), None)
     parts = (*COORDINATES, ALL_THREE)
     if table is None or "part" not in table.keys:
@@ -130,16 +181,31 @@ def first_map(claims: Sequence[Finding]) -> Figure | None:
     grid = grid.only(part in parts for part in grid["part"])
     if not grid.rows:
         return None
-    each = ", ".join(f"{sum(shown.decided)} of {len(shown.decided)} in {NAMED[part]}"
-                     for part in parts for shown in [grid.where(part=part)])
-    caption = (
-        "Each mark is one start of the peg, by tilt and by distance from the wall. A dot: the hand's path with "
-        "impulses (IAPB) is the nearest to the path at a rigid wall (ideal). A cross: the path with springs alone (PB) "
-        "or at a rigid wall felt through a spring (CBuc) is nearer. A ring cannot tell: the distances differ by less "
-        f"than the error of the ideal path. Of the starts on this grid that can tell, IAPB is nearest in {each}."
+    each = ", ".join(
+        f"{sum(shown.decided)} of {len(shown.decided)} in {NAMED[part]}"
+        for part in parts
+        for shown in [grid.where(part=part)]
     )
-    return condition_map("where-c10", "Where impulses are nearest to a rigid wall", caption, grid, "tilt", "clearance",
-                         "part", words=NAMED)
+    caption = (
+        "Each mark is one start of the peg, by tilt and by distance from the wall. A dot: the "
+        "hand's path with "
+        "impulses (IAPB) is the nearest to the path at a rigid wall (ideal). A cross: the path "
+        "with springs alone (PB) "
+        "or at a rigid wall felt through a spring (CBuc) is nearer. A ring cannot tell: the "
+        "distances differ by less "
+        f"than the error of the ideal path. Of the starts on this grid that can tell, IAPB is "
+        f"nearest in {each}."
+    )
+    return condition_map(
+        "where-c10",
+        "Where impulses are nearest to a rigid wall",
+        caption,
+        grid,
+        "tilt",
+        "clearance",
+        "part",
+        words=NAMED,
+    )
 
 
 def ranked(found: Iterable[Any]) -> list[Any]:
@@ -148,7 +214,9 @@ def ranked(found: Iterable[Any]) -> list[Any]:
 
 
 def worst_first(cases: Iterable[Finding]) -> list[Finding]:
-    """Return the hard cases: those that the engine fails, then by the number of methods that fail."""
+    """Return the hard cases: those that the engine fails, then by the number of methods that
+    fail."""
+
     def rank(case: Finding) -> tuple[bool, int]:
         failing = [part.name for part in case.parts if part.verdict == finding.REFUTED]
         return not any(name in ENGINE for name in failing), -len(failing)
@@ -167,12 +235,19 @@ def badge_words(topic: Finding) -> str:
 
 def judged(part: Part) -> str:
     """Return the verdict on a part in words: whether its target is met, if it has one."""
-    met = {finding.REPRODUCED: "met", finding.MIXED: "in part", finding.REFUTED: "missed"} if part.target else FINDINGS
-    return part.outcome if part.role or part.region else met.get(part.verdict, FINDINGS[part.verdict])
+    met = (
+        {finding.REPRODUCED: "met", finding.MIXED: "in part", finding.REFUTED: "missed"}
+        if part.target
+        else FINDINGS
+    )
+    return (
+        part.outcome if part.role or part.region else met.get(part.verdict, FINDINGS[part.verdict])
+    )
 
 
 def counted(part: Part) -> str:
-    """Return as text in how many of the decided trials a part holds, how many cannot tell, and its region's counts."""
+    """Return as text in how many of the decided trials a part holds, how many cannot tell, and its
+    region's counts."""
     if not part.decided and not part.unknown:
         return "no trials" if part.verdict == finding.NOT_TESTABLE else ""
     unknown = f" ({part.unknown} more cannot tell)" if part.unknown else ""
@@ -183,27 +258,45 @@ def counted(part: Part) -> str:
     both = (region.others, "other"), (region.fresh, "new")
     confirmed = " and ".join(f"{count} {which}" for count, which in both if count)
     without = " (new trials not counted)" if region.fresh else ""
-    return (f"(range chosen from {region.searched} trials, confirmed by {confirmed} trials{share}); over all "
-            f"conditions{without} {part.held} of {part.decided}{cases}{unknown}")  # fmt: skip
+    return (
+        f"(range chosen from {region.searched} trials, confirmed by {confirmed} trials{share}); "
+        f"over all "
+        f"conditions{without} {part.held} of {part.decided}{cases}{unknown}"
+    )
 
 
 def tables_without(topic: Finding, figures: Sequence[Figure]) -> tuple[tuple[str, Table], ...]:
     """Return the names and tables of a topic that are not drawn in a figure."""
     drawn = {name for figure in figures for name in figure.inputs}
-    return tuple((name, table) for name, table in topic.tables.items() if f"{topic.key}/{name}" not in drawn)
+    return tuple(
+        (name, table) for name, table in topic.tables.items() if f"{topic.key}/{name}" not in drawn
+    )
 
 
 def _environment() -> Environment:
     environment = Environment(
-        loader=PackageLoader("reports.pages", "templates"), autoescape=True, undefined=StrictUndefined,
-        trim_blocks=True, lstrip_blocks=True,
+        loader=PackageLoader("reports.pages", "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
     environment.filters.update(
-        cell=format_cell, formula=formula, prose=prose, swatch=swatch, svg=_labelled,
-        mark=OUTCOME_MARKS.__getitem__, outcome_class=OUTCOME_CLASSES.__getitem__,
-        judged=judged, heading=lambda title: HEADINGS.get(title, title), badge_words=badge_words,
-        counted=counted, tables_without=tables_without,
-        ranked=ranked, worst_first=worst_first, title=lambda name: name[:1].upper() + name[1:],
+        cell=format_cell,
+        formula=formula,
+        prose=prose,
+        swatch=swatch,
+        svg=_labelled,
+        mark=OUTCOME_MARKS.__getitem__,
+        outcome_class=OUTCOME_CLASSES.__getitem__,
+        judged=judged,
+        heading=lambda title: HEADINGS.get(title, title),
+        badge_words=badge_words,
+        counted=counted,
+        tables_without=tables_without,
+        ranked=ranked,
+        worst_first=worst_first,
+        title=lambda name: name[:1].upper() + name[1:],
     )
     environment.globals |= {"rows_shown": ROWS_SHOWN, "engine": ENGINE}
     environment.tests["numeric"] = is_number
@@ -214,5 +307,8 @@ def _labelled(panel: Any) -> Markup:
     """Return a panel with its description: its SVG as an image, or its table."""
     label = Markup('aria-label="{}"').format(panel.alt)
     drawn = str(panel.svg)  # not Markup, which would escape what replaces its text
-    return Markup(drawn.replace("<table ", f"<table {label} ", 1) if panel.is_table else
-                  drawn.replace("<svg ", f'<svg role="img" {label} ', 1))  # fmt: skip
+    return Markup(
+        drawn.replace("<table ", f"<table {label} ", 1)
+        if panel.is_table
+        else drawn.replace("<svg ", f'<svg role="img" {label} ', 1)
+    )

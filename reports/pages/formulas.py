@@ -1,4 +1,5 @@
-"""Convert LaTeX to MathML at build time, so that formulas need no script, and format numbers in sentences."""
+"""Convert LaTeX to MathML at build time, so that formulas need no script, and format numbers in
+sentences."""
 
 from __future__ import annotations
 
@@ -21,20 +22,25 @@ def formula(latex: str, display: str = "block") -> Markup:
 
 
 def _shortened(mathml: str) -> str:
-    """Return the same formula in half the bytes: plain characters, no groups of one element, no implied namespace."""
+    """Return the same formula in half the bytes: plain characters, no groups of one element, no
+    implied namespace."""
     text = _REFERENCE.sub(lambda reference: str(escape(chr(int(reference.group(1), 16)))), mathml)
     text = _GROUP_OF_ONE.sub(r"\1", text.replace(' xmlns="http://www.w3.org/1998/Math/MathML"', ""))
     return text.replace('<mspace width="0.167em" />', '<mspace width=".17em"/>')
 
 
 def prose(text: str) -> Markup:
-    """Return text with its ``$...$`` formulas as MathML, powers of ten as 10ⁿ, and the rest escaped."""
+    """Return text with its ``$...$`` formulas as MathML, powers of ten as 10ⁿ, and the rest
+    escaped."""
     return Markup("").join(
-        formula(piece, "inline") if k % 2 else _powers(piece) for k, piece in enumerate(_INLINE.split(text)))
+        formula(piece, "inline") if k % 2 else _powers(piece)
+        for k, piece in enumerate(_INLINE.split(text))
+    )
 
 
 def _powers(text: str) -> Markup:
-    """Return escaped text in which 2.0e-16 becomes 2.0 · 10⁻¹⁶, -1 gets a true minus sign, and >= becomes ≥."""
+    """Return escaped text in which 2.0e-16 becomes 2.0 · 10⁻¹⁶, -1 gets a true minus sign, and >=
+    becomes ≥."""
     signs = str(escape(text.replace(">=", "≥").replace("<=", "≤")))
     return Markup(_NEGATIVE.sub("\N{MINUS SIGN}", _POWER.sub(_power, signs)))
 
@@ -47,4 +53,8 @@ def _power(match: re.Match[str]) -> str:
     if exponent == 0:
         return mantissa
     power = f"10<sup>{str(exponent).replace('-', chr(0x2212))}</sup>"
-    return power if mantissa == "1" else f"{mantissa}\N{NARROW NO-BREAK SPACE}·\N{NARROW NO-BREAK SPACE}{power}"
+    return (
+        power
+        if mantissa == "1"
+        else f"{mantissa}\N{NARROW NO-BREAK SPACE}·\N{NARROW NO-BREAK SPACE}{power}"
+    )

@@ -1,5 +1,5 @@
-"""The plain records from which the report is built. Every field of Evidence may be empty; an empty field is printed
-as "not computed in this run", never as a number.
+"""The plain records from which the report is built. Every field of Evidence may be empty; an empty
+field is printed as "not computed in this run", never as a number.
 
 Findings and proofs come unchanged from the studies; the pages use no other data.
 """
@@ -27,8 +27,8 @@ class FailedCases:
 
 @dataclass(frozen=True)
 class Evidence:
-    """Everything that the report may show. `inputs` holds runs, resolved scenes and tables by the names that the
-    figures use (`needs` of each recipe)."""
+    """Everything that the report may show. `inputs` holds runs, resolved scenes and tables by the
+    names that the figures use (`needs` of each recipe)."""
 
     inputs: Mapping[str, Any] = field(default_factory=dict)
     scenes: Mapping[str, Any] = field(default_factory=dict)  # resolved scenes by name
@@ -36,10 +36,14 @@ class Evidence:
     proofs: tuple[ProofRecord, ...] = ()
     counterexamples: tuple[Finding, ...] = ()  # laws that a resolver or strategy breaks
     hard_cases: tuple[Finding, ...] = ()
-    effects: Mapping[str, Table] = field(default_factory=dict)  # of each scene, as `verification.cost.effects` has them
+    effects: Mapping[str, Table] = field(
+        default_factory=dict
+    )  # of each scene, as `verification.cost.effects` has them
     topics: tuple[Finding, ...] = ()  # the first page has the answer of each, in this order
     failed: tuple[FailedCases, ...] = ()
     provenance: Mapping[str, str] = field(default_factory=dict)
     runs: tuple[StoredFile, ...] = ()  # that the numbers were computed from
-    seconds: Mapping[str, float] = field(default_factory=dict)  # that each stage took to compute or read
+    seconds: Mapping[str, float] = field(
+        default_factory=dict
+    )  # that each stage took to compute or read
     figure_command: str = "iapb reproduce --figure {key}"

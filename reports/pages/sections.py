@@ -1,4 +1,5 @@
-"""The sections of the report in reading order, in five groups; each has one template, one page and one line here."""
+"""The sections of the report in reading order, in five groups; each has one template, one page and
+one line here."""
 
 from __future__ import annotations
 
@@ -12,7 +13,8 @@ class Section:
     """A section.
 
     group : heading in the contents
-    needs : field of Evidence, or key of a topic, without which the page says that it was not computed
+    needs : field of Evidence, or key of a topic, without which the page says that it was not
+        computed
     stages : stages of the evidence whose failed cases the section lists
     topic : whether it is drawn from a Finding, by the template that all of them share
     """
@@ -35,22 +37,43 @@ class Section:
 
     def ready(self, evidence: Evidence) -> bool:
         """Return whether there is evidence to show."""
-        return (not self.needs or bool(getattr(evidence, self.needs, ()))
-                or any(topic.key == self.needs for topic in evidence.topics))  # fmt: skip
+        return (
+            not self.needs
+            or bool(getattr(evidence, self.needs, ()))
+            or any(topic.key == self.needs for topic in evidence.topics)
+        )
 
 
 def _topic(group: str, id: str, title: str) -> Section:
     return Section(group, id, title, id, (id,), topic=True)
 
 
-PAPER, ENERGY, CHECKS, TIME, DATA = "The paper", "Energy", "Is it right?", "Time and effects", "Make it again"
+PAPER, ENERGY, CHECKS, TIME, DATA = (
+    "The paper",
+    "Energy",
+    "Is it right?",
+    "Time and effects",
+    "Make it again",
+)
 SECTIONS: tuple[Section, ...] = (
     Section(PAPER, "idea", "The idea"),
-    Section(PAPER, "claims", "Claims ledger", "claims", ("claims", "claims on the peg", "claims on times")),
+    Section(
+        PAPER,
+        "claims",
+        "Claims ledger",
+        "claims",
+        ("claims", "claims on the peg", "claims on times"),
+    ),
     Section(PAPER, "figures", "Figures of the paper", "", ("runs of the figures",)),
     Section(PAPER, "couplings", "Device and tool"),
     Section(ENERGY, "proofs", "Proofs", "proofs", ("proofs",)),
-    Section(ENERGY, "properties", "Properties", "properties", ("properties", "counterexamples", "energy-gains")),
+    Section(
+        ENERGY,
+        "properties",
+        "Properties",
+        "properties",
+        ("properties", "counterexamples", "energy-gains"),
+    ),
     _topic(ENERGY, "exact-energy", "Exact energy"),
     _topic(CHECKS, "mechanics", "Linkages and free bodies"),
     _topic(CHECKS, "scene-ledger", "The scenes"),

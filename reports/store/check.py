@@ -33,7 +33,8 @@ class FileState:
 
 
 def check_store(folder: Path | str, progress: Progress | None = None) -> tuple[FileState, ...]:
-    """Read every result file below a folder (or a single file) completely, and check its seal and hashes.
+    """Read every result file below a folder (or a single file) completely, and check its seal and
+    hashes.
 
     `progress` is called as progress(files read, total files).
     """
@@ -50,7 +51,8 @@ def check_store(folder: Path | str, progress: Progress | None = None) -> tuple[F
 
 
 def is_run(path: Path) -> bool:
-    """Return whether a file is a run or a damaged file of iapb; tables and foreign files are not."""
+    """Return whether a file is a run or a damaged file of iapb; tables and foreign files are
+    not."""
     try:
         return path.is_file() and _head(path)[0] == FORMAT
     except RunFileError:

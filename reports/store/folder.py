@@ -3,8 +3,9 @@
     store = RunStore("out/runs")
     run = store.get_or_run(inputs, lambda: simulate(scene, law))
 
-A file is named by a label and its run key, the hash of everything that determines the run. A run that gave up is
-stored as ``<name>.h5.partial``, for readers, and is computed again next time. A finished file is never written again.
+A file is named by a label and its run key, the hash of everything that determines the run. A run
+that gave up is stored as ``<name>.h5.partial``, for readers, and is computed again next time. A
+finished file is never written again.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ from reports.store.keys import run_key
 from reports.store.runs import RunEntry, read_entry, read_stored, store_run
 
 PARTIAL_SUFFIX = ".partial"
-_KEY_DIGITS = 16  # 64 bits: a collision among a million runs has a probability below 1e-7; the file has all 256 bits
+# 64 bits: a collision among a million runs has a probability below 1e-7; the file has all 256 bits
+_KEY_DIGITS = 16
 
 
 class Place(NamedTuple):
@@ -44,8 +46,8 @@ class RunStore:
     folder
         Folder of the runs; it is created if it does not exist.
     code
-        Code version that enters the run keys; by default a hash of the engine's and the references' sources.
-        For runs with your own law, add the version of the law here or in the inputs.
+        Code version that enters the run keys; by default a hash of the engine's and the references'
+        sources. For runs with your own law, add the version of the law here or in the inputs.
     """
 
     def __init__(self, folder: Path | str, code: str | None = None) -> None:
@@ -53,27 +55,40 @@ class RunStore:
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise RunFileError(f"{self.folder}: cannot be a folder of runs: {error.strerror or error}") from error
+            raise RunFileError(
+                f"{self.folder}: cannot be a folder of runs: {error.strerror or error}"
+            ) from error
 
     def place_of(self, inputs: Mapping[str, Any], label: str = "run") -> Place:
         """Return the key of `inputs`, and the file that their run has or will have.
 
-        The file name starts with `label`. The label is not part of the key: a run is found under any label.
+        The file name starts with `label`. The label is not part of the key: a run is found under
+        any label.
         """
         key = run_key(inputs, self.code)
         word = re.sub(r"[^A-Za-z0-9._]+", "-", label).strip("-.") or "run"
         path = self.folder / f"{word}-{key[:_KEY_DIGITS]}.h5"
-        return Place(key, path if path.is_file() else min(self.folder.glob(f"*-{key[:_KEY_DIGITS]}.h5"), default=path))
+        return Place(
+            key,
+            path
+            if path.is_file()
+            else min(self.folder.glob(f"*-{key[:_KEY_DIGITS]}.h5"), default=path),
+        )
 
-    def get_or_run(self, inputs: Mapping[str, Any], compute: Callable[[], Run], label: str = "run") -> Run:
-        """Return the run of `inputs` (everything that determines it): read it, or compute and store it.
+    def get_or_run(
+        self, inputs: Mapping[str, Any], compute: Callable[[], Run], label: str = "run"
+    ) -> Run:
+        """Return the run of `inputs` (everything that determines it): read it, or compute and store
+        it.
 
-        It has ``complete=False`` if `compute` gave up early. Then it is stored as partial and computed again next time.
+        It has ``complete=False`` if `compute` gave up early. Then it is stored as partial and
+        computed again next time.
 
         Raises
         ------
         RunFileError
-            The file is damaged. A damaged file is not replaced automatically: remove it to compute the run again.
+            The file is damaged. A damaged file is not replaced automatically: remove it to compute
+            the run again.
         """
         return self.fetch(self.place_of(inputs, label), compute)[0]
 
@@ -82,7 +97,9 @@ class RunStore:
         if place.path.is_file():
             run, entry = read_stored(place.path)
             if entry.run_key != place.key:
-                raise RunFileError(f"{place.path}: run key is {entry.run_key}: expected {place.key}")
+                raise RunFileError(
+                    f"{place.path}: run key is {entry.run_key}: expected {place.key}"
+                )
             return run, entry
         run = compute()
         if not isinstance(run, Run):
@@ -105,7 +122,8 @@ class RunStore:
         return entry
 
     def entries(self) -> tuple[RunEntry, ...]:
-        """Return one entry per finished run in the folder, by file name; other and damaged files are left out."""
+        """Return one entry per finished run in the folder, by file name; other and damaged files
+        are left out."""
         found: list[RunEntry] = []
         for path in sorted(self.folder.glob("*.h5")):
             with suppress(RunFileError):

@@ -1,9 +1,11 @@
-"""Result files: HDF5 with units and dimension scales, written atomically and sealed with a checksum.
+"""Result files: HDF5 with units and dimension scales, written atomically and sealed with a
+checksum.
 
-A file is written under a temporary name, synced and renamed. Its seal is a checksum of the whole HDF5 content, appended
-after it. HDF5's own checksums cover only chunks of numbers and some metadata, and one wrong byte elsewhere can crash
-the HDF5 library (we have seen a double free, which ends the process). Therefore the seal is checked before the library
-opens the file. HDF5 and all software based on it ignore bytes after the end that the file states.
+A file is written under a temporary name, synced and renamed. Its seal is a checksum of the whole
+HDF5 content, appended after it. HDF5's own checksums cover only chunks of numbers and some
+metadata, and one wrong byte elsewhere can crash the HDF5 library (we have seen a double free, which
+ends the process). Therefore the seal is checked before the library opens the file. HDF5 and all
+software based on it ignore bytes after the end that the file states.
 """
 
 from __future__ import annotations
@@ -51,9 +53,9 @@ def _sync(path: Path) -> None:
 def written_aside(target: Path, *, replace: bool, synced: bool = True) -> Iterator[Path]:
     """Yield a temporary path to write to; afterwards move it to `target` atomically.
 
-    A crash at any time leaves `target` unchanged. With ``replace=False`` a target that exists at the end is kept, and
-    the temporary file is removed: the first of two writers wins. A file that is not `synced` may be lost, not damaged
-    unseen, by a power failure.
+    A crash at any time leaves `target` unchanged. With ``replace=False`` a target that exists at
+    the end is kept, and the temporary file is removed: the first of two writers wins. A file that
+    is not `synced` may be lost, not damaged unseen, by a power failure.
 
     Raises
     ------
@@ -85,11 +87,17 @@ def written_aside(target: Path, *, replace: bool, synced: bool = True) -> Iterat
             aside.unlink(missing_ok=True)
     except (OSError, RuntimeError) as error:
         named = Path(getattr(error, "filename", None) or target)
-        if named not in target.parents and named.parent != target.parent:  # of another file, read meanwhile
+        if (
+            named not in target.parents and named.parent != target.parent
+        ):  # of another file, read meanwhile
             raise
-        number = re.search(r"errno = (\d+)", str(error))  # the HDF5 library includes the number in its message
+        number = re.search(
+            r"errno = (\d+)", str(error)
+        )  # the HDF5 library includes the number in its message
         why = getattr(error, "strerror", None) or (os.strerror(int(number[1])) if number else error)
-        raise RunFileError(f"{target}: cannot be written: {why}; the previous file is unchanged") from error
+        raise RunFileError(
+            f"{target}: cannot be written: {why}; the previous file is unchanged"
+        ) from error
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
@@ -99,12 +107,14 @@ def write_whole(path: Path, content: str | bytes) -> None:
 
 
 def looks_ours(path: Path) -> bool:
-    """Return whether a file is ours or was so before it was damaged: it ends like a seal, or its HDF5 head has our
-    attributes."""
+    """Return whether a file is ours or was so before it was damaged: it ends like a seal, or its
+    HDF5 head has our attributes."""
     head, end = _ends(path)
     return end.startswith(_MARK) or (
-        head.startswith(_HDF5_SIGNATURE) and b"\0format_version\0" in head
-        and any(name.encode() in head for name in _FORMATS))
+        head.startswith(_HDF5_SIGNATURE)
+        and b"\0format_version\0" in head
+        and any(name.encode() in head for name in _FORMATS)
+    )
 
 
 def _ends(path: Path) -> tuple[bytes, bytes]:
@@ -127,10 +137,15 @@ def _check_seal(path: Path) -> None:
         raise RunFileError(f"{path}: not an HDF5 file, or damaged at its beginning")
     size = path.stat().st_size - _SEAL
     if size < 0 or not mark.startswith(_MARK):
-        raise RunFileError(f"{path}: no checksum at its end: the file was cut short, changed, or not written by iapb; "
-                           "if it was a run, remove it to compute it again")
+        raise RunFileError(
+            f"{path}: no checksum at its end: the file was cut short, changed, or not written by "
+            f"iapb; "
+            "if it was a run, remove it to compute it again"
+        )
     if mark != _MARK + _checksum(path, size).encode() + b"\n":
-        raise RunFileError(f"{path}: differs from its checksum, the file is damaged; remove it to compute it again")
+        raise RunFileError(
+            f"{path}: differs from its checksum, the file is damaged; remove it to compute it again"
+        )
 
 
 def _checksum(path: Path, size: int) -> str:
@@ -145,8 +160,12 @@ def _checksum(path: Path, size: int) -> str:
 
 @contextmanager
 def _noting_ctrl_c() -> Iterator[None]:
-    """Note Ctrl-C and raise it at the end: in a callback of h5py Python would drop the exception."""
-    if current_thread() is not main_thread() or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+    """Note Ctrl-C and raise it at the end: in a callback of h5py Python would drop the
+    exception."""
+    if (
+        current_thread() is not main_thread()
+        or signal.getsignal(signal.SIGINT) is not signal.default_int_handler
+    ):
         yield
         return
     noted: list[int] = []
@@ -163,7 +182,8 @@ def _noting_ctrl_c() -> Iterator[None]:
 def new_file(path: Path, *, replace: bool) -> Iterator[Any]:
     """Yield an HDF5 file to fill; afterwards it is sealed, synced, and moved to `path` atomically.
 
-    It is filled in memory, so that a disk error occurs in our own write and not inside the HDF5 library.
+    It is filled in memory, so that a disk error occurs in our own write and not inside the HDF5
+    library.
 
     Raises
     ------
@@ -194,7 +214,13 @@ def opened(path: Path | str, expected_format: str | None = FORMAT) -> Iterator[A
 
     path = Path(path)
     if not path.is_file():
-        what = "a folder, not a file" if path.is_dir() else "no regular file" if path.exists() else "no such file"
+        what = (
+            "a folder, not a file"
+            if path.is_dir()
+            else "no regular file"
+            if path.exists()
+            else "no such file"
+        )
         raise RunFileError(f"{path}: {what}")
     try:
         _check_seal(path)
@@ -202,17 +228,28 @@ def opened(path: Path | str, expected_format: str | None = FORMAT) -> Iterator[A
             found = attribute_of(file, "format")
             if expected_format not in (None, found):
                 raise RunFileError(f"{path}: format is {found!r}: expected {expected_format!r}")
-            version = int(attribute_of(file, "format_version", 0)) if expected_format else FORMAT_VERSION
+            version = (
+                int(attribute_of(file, "format_version", 0)) if expected_format else FORMAT_VERSION
+            )
             if version != FORMAT_VERSION:
                 earlier = version < FORMAT_VERSION
-                more = "; simulate the run again, it will be stored beside this file" if earlier else ""
-                raise RunFileError(f"{path}: format version is {version}, of {'an earlier' if earlier else 'a later'} "
-                                   f"iapb: this one reads {FORMAT_VERSION}{more}")
+                more = (
+                    "; simulate the run again, it will be stored beside this file"
+                    if earlier
+                    else ""
+                )
+                raise RunFileError(
+                    f"{path}: format version is {version}, of "
+                    f"{'an earlier' if earlier else 'a later'} "
+                    f"iapb: this one reads {FORMAT_VERSION}{more}"
+                )
             yield file
     except IapbError:
         raise
     except Exception as error:  # sealed, but made by other software: any error is possible
-        raise RunFileError(f"{path}: cannot be read as {expected_format or 'a file of iapb'}: {error}") from error
+        raise RunFileError(
+            f"{path}: cannot be read as {expected_format or 'a file of iapb'}: {error}"
+        ) from error
 
 
 def write_text(group: Any, name: str, text: str) -> None:
@@ -235,8 +272,15 @@ def write_values(group: Any, name: str, values: Any) -> Any:
     rows = max(_CHUNK_BYTES // max(int(np.prod(array.shape[1:])) * array.itemsize, 1), 1)
     largest: tuple[int | None, ...] = (None,) * array.ndim if array.size == 0 else array.shape
     chunks = (min(rows, max(array.shape[0], 1)), *(max(length, 1) for length in array.shape[1:]))
-    return group.create_dataset(name, data=array, chunks=chunks, maxshape=largest, compression="gzip",
-                                compression_opts=4, shuffle=True)  # fmt: skip
+    return group.create_dataset(
+        name,
+        data=array,
+        chunks=chunks,
+        maxshape=largest,
+        compression="gzip",
+        compression_opts=4,
+        shuffle=True,
+    )
 
 
 def write_scale(group: Any, dimension: str, values: Any, unit: str) -> Any:
@@ -247,7 +291,9 @@ def write_scale(group: Any, dimension: str, values: Any, unit: str) -> Any:
     return scale
 
 
-def write_quantity(group: Any, name: str, values: Any, scales: Sequence[Any], unit: str, meaning: str) -> Any:
+def write_quantity(
+    group: Any, name: str, values: Any, scales: Sequence[Any], unit: str, meaning: str
+) -> Any:
     """Write one quantity along dimensions with these scales."""
     dataset = write_values(group, name, values)
     dataset.attrs.update({"units": unit, "long_name": meaning})
@@ -257,7 +303,8 @@ def write_quantity(group: Any, name: str, values: Any, scales: Sequence[Any], un
 
 
 def blocks(values: Any) -> Iterator[np.ndarray]:
-    """Yield an array or a dataset in blocks of rows of about a megabyte; an empty one is yielded unchanged."""
+    """Yield an array or a dataset in blocks of rows of about a megabyte; an empty one is yielded
+    unchanged."""
     width = max(int(np.prod(values.shape[1:])) * values.dtype.itemsize, 1)
     rows = max(_BLOCK // width, 1)
     for first in range(0, max(len(values), 1), rows):

@@ -24,14 +24,16 @@ from iapb.scene import scene_folder
 from reports.store.io import blocks, write_whole
 from reports.store.schema import GROUPS, RESULT_GROUPS
 
-# Sources that can change a number in a run: the engine, the reference worlds, and the numeric packages.
+# Sources that can change a number in a run: the engine, the reference worlds, and the numeric
+# packages.
 _SOURCES = ("iapb", "reference")
 _ROOT = Path(__file__).resolve().parents[2]
 _NUMERIC_PACKAGES = ("numpy", "numba", "scipy")
 
 
 def plain(value: Any) -> Any:
-    """Return `value` in the types of JSON: records become mappings, arrays and tuples lists, numpy scalars numbers."""
+    """Return `value` in the types of JSON: records become mappings, arrays and tuples lists, numpy
+    scalars numbers."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, np.ndarray | np.generic):
@@ -46,11 +48,14 @@ def plain(value: Any) -> Any:
         return plain(value.value) if isinstance(value, Enum) else str(value)
     if value is None or isinstance(value, bool | int | float | str):
         return value
-    raise ArgumentError("value", value, "records, mappings, sequences, arrays, numbers, texts and None only")
+    raise ArgumentError(
+        "value", value, "records, mappings, sequences, arrays, numbers, texts and None only"
+    )
 
 
 def canonical_json(value: Any) -> str:
-    """Return the canonical JSON text of `value`: sorted keys, and floats in their shortest exact form."""
+    """Return the canonical JSON text of `value`: sorted keys, and floats in their shortest exact
+    form."""
     return json.dumps(plain(value), sort_keys=True, separators=(",", ":"), ensure_ascii=False)
 
 
@@ -58,7 +63,8 @@ def canonical_json(value: Any) -> str:
 def code_version() -> str:
     """Return a hash of everything that can change a run's numbers.
 
-    It is a hash of sources, not a commit: it knows uncommitted changes, and does not depend on the code of the report.
+    It is a hash of sources, not a commit: it knows uncommitted changes, and does not depend on the
+    code of the report.
     """
     packages = [f"{package} {version(package)}" for package in _NUMERIC_PACKAGES]
     return hash_of([*packages, *(sources_hash(package) for package in _SOURCES)])
@@ -66,12 +72,27 @@ def code_version() -> str:
 
 @cache
 def evidence_version() -> str:
-    """Return a hash of everything that can change a verdict: engine, references, checks, stages, scenes and cases."""
+    """Return a hash of everything that can change a verdict: engine, references, checks, stages,
+    scenes and cases."""
     files = sorted(path for path in scene_folder().rglob("*") if path.is_file())
-    scenes = {path.relative_to(scene_folder()).as_posix(): path.read_text(encoding="utf-8") for path in files}
-    cases = {path.relative_to(_ROOT).as_posix(): path.read_text(encoding="utf-8")
-             for path in sorted((_ROOT / "verification").rglob("*")) if path.suffix in (".yaml", ".xml")}  # fmt: skip
-    return hash_of([code_version(), sources_hash("verification"), sources_hash("reports/evidence"), scenes, cases])
+    scenes = {
+        path.relative_to(scene_folder()).as_posix(): path.read_text(encoding="utf-8")
+        for path in files
+    }
+    cases = {
+        path.relative_to(_ROOT).as_posix(): path.read_text(encoding="utf-8")
+        for path in sorted((_ROOT / "verification").rglob("*"))
+        if path.suffix in (".yaml", ".xml")
+    }
+    return hash_of(
+        [
+            code_version(),
+            sources_hash("verification"),
+            sources_hash("reports/evidence"),
+            scenes,
+            cases,
+        ]
+    )
 
 
 def hash_of(value: Any) -> str:
@@ -81,19 +102,28 @@ def hash_of(value: Any) -> str:
 
 @cache
 def sources_hash(folder: str) -> str:
-    """Return a hash of the code of all Python files below a folder of the checkout, without comments and docstrings.
+    """Return a hash of the code of all Python files below a folder of the checkout, without
+    comments and docstrings.
 
-    Parsing all sources takes seconds, so the hash of each file's code is cached beside the compiled modules.
+    Parsing all sources takes seconds, so the hash of each file's code is cached beside the compiled
+    modules.
     """
-    files = {path.relative_to(_ROOT).as_posix(): path.read_bytes() for path in (_ROOT / folder).rglob("*.py")}
+    files = {
+        path.relative_to(_ROOT).as_posix(): path.read_bytes()
+        for path in (_ROOT / folder).rglob("*.py")
+    }
     if not files:
         raise ArgumentError("folder", folder, "a folder of the checkout with Python files")
     names = {name: hashlib.sha256(source).hexdigest() for name, source in files.items()}
-    kept = Path(cache_from_source(__file__)).with_name(f"code-{folder.replace('/', '-')}-{sys.version_info.minor}.json")
+    kept = Path(cache_from_source(__file__)).with_name(
+        f"code-{folder.replace('/', '-')}-{sys.version_info.minor}.json"
+    )
     known: dict[str, str] = {}
     with suppress(OSError, ValueError, TypeError):
         known = dict(json.loads(kept.read_text(encoding="utf-8")))
-    codes = {names[name]: known.get(names[name]) or code_hash(source) for name, source in files.items()}
+    codes = {
+        names[name]: known.get(names[name]) or code_hash(source) for name, source in files.items()
+    }
     if codes != known:
         with suppress(RunFileError):  # the folder may be read-only
             write_whole(kept, json.dumps(codes))
@@ -113,8 +143,8 @@ def code_hash(source: bytes) -> str:
 def run_key(inputs: Mapping[str, Any], code: str | None = None) -> str:
     """Return the run key: sha256 of the inputs and of the code version, in hexadecimal.
 
-    The inputs are everything that determines the run; `code` is by default the engine's version, pass another one to
-    include the code of your own law.
+    The inputs are everything that determines the run; `code` is by default the engine's version,
+    pass another one to include the code of your own law.
     """
     return hash_of({"inputs": inputs, "code": code_version() if code is None else code})
 
@@ -128,7 +158,8 @@ def add_array(digest: Any, name: str, array: Any) -> None:
 
 
 def content_hash(run: Run) -> str:
-    """Return sha256 of the results, without timings and provenance; an exact repetition gives the same hash."""
+    """Return sha256 of the results, without timings and provenance; an exact repetition gives the
+    same hash."""
     digest = hashlib.sha256()
     digest.update(canonical_json(list(result_head(run).values())).encode())
     for name, values in results_of(run):

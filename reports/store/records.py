@@ -18,7 +18,8 @@ RECORDS = "records"
 def write_record(
     path: Path, value: Any, title: str, provenance: Mapping[str, str], runs: Sequence[str] = ()
 ) -> Path:
-    """Write any records as JSON; see `plain` for the types, `runs` are the files behind the records."""
+    """Write any records as JSON; see `plain` for the types, `runs` are the files behind the
+    records."""
     with io.new_file(path, replace=True) as file:
         file.attrs.update({"format": TABLE_FORMAT, "format_version": FORMAT_VERSION})
         for name, fact in provenance.items():

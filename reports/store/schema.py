@@ -1,17 +1,18 @@
-"""The layout of a run file: the groups of the quantities of `iapb.run`, shared by writer and reader.
+"""The layout of a run file: the groups of the quantities of `iapb.run`, shared by writer and
+reader.
 
     /scene, /law, /coupling   texts: name, YAML source, every setting as JSON
     /trajectory               states at n + 1 instants
     /steps                    forces, impulse and contact state of the n steps between them
-    /contacts                 a ragged table: the contacts of step k are the rows offsets[k]:offsets[k + 1]
-    /impacts                  one row per step and island of a colliding group
-    /energy                   the energy balance, at instants and over steps
+    /contacts                 a ragged table: the contacts of step k are the rows
+    offsets[k]:offsets[k + 1] /impacts                  one row per step and island of a colliding
+    group /energy                   the energy balance, at instants and over steps
     /effects                  the active effects, and the reasons
     /timings, /provenance     outside of the content hash, because they depend on the machine
 
-If the attribute `every` of the file is N > 1, the record is thinned (`iapb.thinning`): its steps are every N-th step
-and each step with an impact. Kept step i begins at time[i]; impacts count the kept steps; energies are those at the
-kept instants, computed from all steps.
+If the attribute `every` of the file is N > 1, the record is thinned (`iapb.thinning`): its steps
+are every N-th step and each step with an impact. Kept step i begins at time[i]; impacts count the
+kept steps; energies are those at the kept instants, computed from all steps.
 
 Each group has its own dimension scales, so that it opens as one xarray dataset.
 """
@@ -28,7 +29,8 @@ from iapb.schema import Quantity, quantities
 
 FORMAT = "iapb run"
 TABLE_FORMAT = "iapb table"
-# 2: names and units of velocities, which quaternions need; 3: poses; 4: digests of M; 5: names of energies, every
+# 2: names and units of velocities, which quaternions need; 3: poses; 4: digests of M; 5: names of
+# energies, every
 FORMAT_VERSION = 5
 
 # group -> its quantities, and the record that holds them
@@ -39,7 +41,12 @@ GROUPS: dict[str, tuple[tuple[Quantity, ...], Callable[[Run], Any]]] = {
     "impacts": (quantities(ImpactTable), lambda run: run.impacts),
     "timings": (quantities(Run, "chunk"), lambda run: run),
 }
-RESULT_GROUPS = ("trajectory", "steps", "contacts", "impacts")  # with the energy balance: the content hash
+RESULT_GROUPS = (
+    "trajectory",
+    "steps",
+    "contacts",
+    "impacts",
+)  # with the energy balance: the content hash
 
 # (group, name, attribute of Run): texts; those of `JSON_TEXTS` are stored as JSON
 TEXTS = (
@@ -54,7 +61,10 @@ TEXTS = (
     ("coupling", "settings", "coupling_settings"),
 )
 JSON_TEXTS = frozenset({"scene_resolved", "law_settings", "coupling_settings"})
-SENTENCES = ("remarks", "distrust")  # lists of sentences, as JSON in attributes of the file; a file may lack them
+SENTENCES = (
+    "remarks",
+    "distrust",
+)  # lists of sentences, as JSON in attributes of the file; a file may lack them
 
 STATE_ATTRIBUTES = {
     "flag_values": np.arange(len(STATE_NAMES), dtype=np.int8),

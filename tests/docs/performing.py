@@ -1,13 +1,16 @@
-"""The fenced blocks of a Markdown document, and `python performing.py DOCUMENT ANSWERS.json`, which performs them.
+"""The fenced blocks of a Markdown document, and `python performing.py DOCUMENT ANSWERS.json`, which
+performs them.
 
-    ```python            executed, in order, in one namespace for the document; a ```text block right after it is
+    ```python            executed, in order, in one namespace for the document; a ```text block
+    right after it is
                          what it printed
-    ```console           "$ " starts a command (iapb, cat, pytest); the lines after it are its output
-    ```yaml, ```python   whose first line is "# some/file.yaml" or "# some/file.py": that file is written
-    ```diff              first line "# some/file.py": lines with "+" are added to that file beside its " " lines
-    ```sh                only read: every `make` target must exist
+    ```console           "$ " starts a command (iapb, cat, pytest); the lines after it are its
+    output ```yaml, ```python   whose first line is "# some/file.yaml" or "# some/file.py": that
+    file is written ```diff              first line "# some/file.py": lines with "+" are added to
+    that file beside its " " lines ```sh                only read: every `make` target must exist
 
-The working directory is where files are written; for documents that add to the project it holds a copy of it.
+The working directory is where files are written; for documents that add to the project it holds a
+copy of it.
 """
 
 from __future__ import annotations
@@ -51,16 +54,33 @@ def read_blocks(name):
     text, found = (ROOT / name).read_text(encoding="utf-8"), []
     for fenced in _FENCED.finditer(text):
         language, body = fenced.groups()
-        place, named = f"{name}:{text.count(chr(10), 0, fenced.start()) + 1}", _FILE_LINE.match(body)
+        place, named = (
+            f"{name}:{text.count(chr(10), 0, fenced.start()) + 1}",
+            _FILE_LINE.match(body),
+        )
         if language == "text" and found[-1].kind == "python" and found[-1].expected is None:
             found[-1].expected, found[-1].span = body, fenced.span(2)
         elif language == "console":
-            found += [Block(place, "command", command[1], "", command[2],
-                            tuple(fenced.start(2) + k for k in command.span(2)))
-                      for command in _COMMAND.finditer(body)]  # fmt: skip
+            found += [
+                Block(
+                    place,
+                    "command",
+                    command[1],
+                    "",
+                    command[2],
+                    tuple(fenced.start(2) + k for k in command.span(2)),
+                )
+                for command in _COMMAND.finditer(body)
+            ]
         elif language in ("diff", "python", "yaml") and named:
-            found.append(Block(place, "diff" if language == "diff" else "file",
-                               body[named.end():] if language == "diff" else body, named[1]))  # fmt: skip
+            found.append(
+                Block(
+                    place,
+                    "diff" if language == "diff" else "file",
+                    body[named.end() :] if language == "diff" else body,
+                    named[1],
+                )
+            )
         elif language in ("python", "sh"):
             found.append(Block(place, language, body))
         else:
@@ -75,7 +95,9 @@ def perform(name):
     """
     namespace, blocks = {"__name__": "document"}, read_blocks(name)
     answers = [{}] * len(blocks)
-    for number, block in sorted(enumerate(blocks), key=lambda pair: pair[1].kind not in ("file", "diff")):
+    for number, block in sorted(
+        enumerate(blocks), key=lambda pair: pair[1].kind not in ("file", "diff")
+    ):
         out, failure, path = io.StringIO(), "", Path(block.path)
         try:
             with redirect_stdout(out), redirect_stderr(out):
@@ -95,8 +117,11 @@ def perform(name):
 
 
 def _command(words):
-    """The commands that documents use, in this process: a start of Python for each would take most of the time."""
-    words = [found for word in words for found in (sorted(glob.glob(word)) if "*" in word else [word])]
+    """The commands that documents use, in this process: a start of Python for each would take most
+    of the time."""
+    words = [
+        found for word in words for found in (sorted(glob.glob(word)) if "*" in word else [word])
+    ]
     if words[0] == "iapb":
         from reports.cli import main
 
@@ -112,20 +137,29 @@ def _command(words):
         import pytest
 
         installed = any(point.name == "iapb" for point in entry_points(group="pytest11"))
-        plugin = [] if installed else ["-p", "pytest_iapb"]  # as in a checkout that was installed before it had one
-        pytest.main([*plugin, "-p", "no:cacheprovider", "--rootdir", ".", "-c", "/dev/null", *words[1:]])
+        plugin = (
+            [] if installed else ["-p", "pytest_iapb"]
+        )  # as in a checkout that was installed before it had one
+        pytest.main(
+            [*plugin, "-p", "no:cacheprovider", "--rootdir", ".", "-c", "/dev/null", *words[1:]]
+        )
     else:
         raise ValueError(f"documents may not use the command {words[0]!r}: nothing would check it")
 
 
 def _apply_diff(path, text):
-    """Insert the lines with "+" beside those with " ", which must stand in the file together and once."""
+    """Insert the lines with "+" beside those with " ", which must stand in the file together and
+    once."""
     whole = "\n" + path.read_text(encoding="utf-8")
     for part in re.split(r"^…?\n", text, flags=re.M):
-        before, after = ("".join(f"\n{line[1:]}" for line in part.splitlines() if line[0] in signs)
-                         for signs in (" ", "+ "))  # fmt: skip
+        before, after = (
+            "".join(f"\n{line[1:]}" for line in part.splitlines() if line[0] in signs)
+            for signs in (" ", "+ ")
+        )
         if part and whole.count(f"{before}\n") != 1:
-            raise ValueError(f"{path} has these lines {whole.count(before)} times, not once:{before}")
+            raise ValueError(
+                f"{path} has these lines {whole.count(before)} times, not once:{before}"
+            )
         whole = whole.replace(f"{before}\n", f"{after}\n")
     path.write_text(whole[1:], encoding="utf-8")
 

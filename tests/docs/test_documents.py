@@ -1,7 +1,8 @@
 """Every block of the documents is performed, and every example; what they show is what comes out.
 
-Words must be equal, numbers up to what another machine may change; "…" in a document stands for anything.
-`IAPB_UPDATE_DOCS=1 pytest -m '' tests/docs` writes today's outputs into the documents; shortened ones stay.
+Words must be equal, numbers up to what another machine may change; "…" in a document stands for
+anything. `IAPB_UPDATE_DOCS=1 pytest -m '' tests/docs` writes today's outputs into the documents;
+shortened ones stay.
 """
 
 import contextlib
@@ -32,15 +33,29 @@ from verification.claims.conditions import IGNORED, Condition
 PICTURES = ROOT / "docs/pictures"
 PACKAGES = ("iapb", "reference", "verification", "reports")
 ADDS_TO_THE_PROJECT = ("docs/extending.md",)
-DOCUMENTS = ("README.md", *(pytest.param(f"docs/{name}.md", marks=pytest.mark.thorough) for name in
-                            ("tutorial", "extending", "scenes", "resolvers", "questions")))  # fmt: skip
+DOCUMENTS = (
+    "README.md",
+    *(
+        pytest.param(f"docs/{name}.md", marks=pytest.mark.thorough)
+        for name in ("tutorial", "extending", "scenes", "resolvers", "questions")
+    ),
+)
 WIDTH = "100"  # of the terminal that the documents show
 RELATIVE = 1e-3  # documents print a few digits
 ROUNDING = 1e-6  # numbers below it are rounding noise, which differs from machine to machine
 COMPILING = re.compile(r"Compiling (kernels .*|took .* s\.)")  # a fresh checkout says it
 HASH = re.compile(r"\b[0-9a-f]{16}(?:[0-9a-f]{48})?\b")
 TIME = re.compile(r"(?<![\w.])[\d.]+(?:e[-+]?\d+)? (?:s|ms|µs)\b")
-MEASURED = ("computed in", "it had taken", "seconds", "proved", "passed in", "failed in", " in 0.", "refuted")
+MEASURED = (
+    "computed in",
+    "it had taken",
+    "seconds",
+    "proved",
+    "passed in",
+    "failed in",
+    " in 0.",
+    "refuted",
+)
 NUMBER = re.compile(r"(?<![\w.])([-+]?\d+(?:\.\d*)?(?:e[-+]?\d+)?)")
 
 
@@ -63,7 +78,8 @@ def differs(printed, expected):
 
 
 def lines_of(text):
-    """Lines that are not empty, with what the machine decides masked or left out, and spaces joined."""
+    """Lines that are not empty, with what the machine decides masked or left out, and spaces
+    joined."""
     lines = []
     for line in text.splitlines():
         if any(word in line for word in MEASURED):
@@ -77,7 +93,9 @@ def fits(given, wanted):
     if "…" in wanted:
         return re.fullmatch(".*".join(map(re.escape, wanted.split("…"))), given) is not None
     one, other = NUMBER.split(given), NUMBER.split(wanted)
-    return len(one) == len(other) and one[::2] == other[::2] and all(map(same, one[1::2], other[1::2]))
+    return (
+        len(one) == len(other) and one[::2] == other[::2] and all(map(same, one[1::2], other[1::2]))
+    )
 
 
 def same(a, b):
@@ -86,11 +104,14 @@ def same(a, b):
 
 
 def copy_project(folder):
-    """Copy the packages and scenes; compiled kernels are shared with the original, or every run would recompile."""
+    """Copy the packages and scenes; compiled kernels are shared with the original, or every run
+    would recompile."""
     for name in PACKAGES:
         shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
         for cache_folder in (ROOT / name).rglob("__pycache__"):
-            (folder / cache_folder.relative_to(ROOT)).symlink_to(cache_folder, target_is_directory=True)
+            (folder / cache_folder.relative_to(ROOT)).symlink_to(
+                cache_folder, target_is_directory=True
+            )
     shutil.copytree(ROOT / "scenes", folder / "scenes")
 
 
@@ -100,12 +121,27 @@ def test_document(name, tmp_path):
     work.mkdir()
     if name in ADDS_TO_THE_PROJECT:
         copy_project(work)
-    environment = {**os.environ, "PYTHONPATH": f"{work}{os.pathsep}{ROOT}", "PYTHONDONTWRITEBYTECODE": "1",
-                   "COLUMNS": WIDTH, "TERM": "dumb", "NO_COLOR": "1"}  # fmt: skip
-    for variable in ("CI", "BUILD_NUMBER", "PYTEST_ADDOPTS"):  # where these are set, pytest prints more
+    environment = {
+        **os.environ,
+        "PYTHONPATH": f"{work}{os.pathsep}{ROOT}",
+        "PYTHONDONTWRITEBYTECODE": "1",
+        "COLUMNS": WIDTH,
+        "TERM": "dumb",
+        "NO_COLOR": "1",
+    }
+    for variable in (
+        "CI",
+        "BUILD_NUMBER",
+        "PYTEST_ADDOPTS",
+    ):  # where these are set, pytest prints more
         environment.pop(variable, None)
-    done = subprocess.run([sys.executable, str(Path(__file__).parent / "performing.py"), name, str(told)],
-                          cwd=work, env=environment, capture_output=True, text=True)  # fmt: skip
+    done = subprocess.run(
+        [sys.executable, str(Path(__file__).parent / "performing.py"), name, str(told)],
+        cwd=work,
+        env=environment,
+        capture_output=True,
+        text=True,
+    )
     assert done.returncode == 0, done.stderr
     makefile = (ROOT / "Makefile").read_text()
     pairs, wrong = list(zip(read_blocks(name), json.loads(told.read_text()), strict=True)), []
@@ -114,13 +150,21 @@ def test_document(name, tmp_path):
         if answer["failure"] or difference and not os.environ.get("IAPB_UPDATE_DOCS"):
             wrong.append(f"{block.id}: {answer['failure'] or difference}\n\n{answer['output']}")
         targets = re.findall(r"^make (\w+)", block.source, flags=re.M) if block.kind == "sh" else []
-        wrong += [f"{block.id}: no make target {target!r}" for target in targets if f"\n{target}:" not in makefile]
+        wrong += [
+            f"{block.id}: no make target {target!r}"
+            for target in targets
+            if f"\n{target}:" not in makefile
+        ]
     if os.environ.get("IAPB_UPDATE_DOCS"):
         text = (ROOT / name).read_text(encoding="utf-8")
         for block, answer in reversed(pairs):
             if block.expected is not None and "…" not in block.expected:
                 lines = [line.rstrip() for line in answer["output"].strip("\n").splitlines()]
-                text = text[: block.span[0]] + "".join(f"{line}\n" for line in lines) + text[block.span[1] :]
+                text = (
+                    text[: block.span[0]]
+                    + "".join(f"{line}\n" for line in lines)
+                    + text[block.span[1] :]
+                )
         (ROOT / name).write_text(text, encoding="utf-8")
     assert not wrong, "\n".join(wrong)
 
@@ -131,7 +175,9 @@ def shared(tmp_path_factory):
     return tmp_path_factory.mktemp("shared")
 
 
-@pytest.mark.parametrize("path", sorted((ROOT / "examples").glob("*.py")), ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path", sorted((ROOT / "examples").glob("*.py")), ids=lambda path: path.stem
+)
 def test_example(path, shared, capfd):
     with contextlib.chdir(shared):
         if path.stem.startswith("test_"):
@@ -141,8 +187,15 @@ def test_example(path, shared, capfd):
     assert capfd.readouterr().out.strip()
 
 
-@pytest.mark.parametrize(("figure", "name"), [("fig01", "impulses_and_forces"), ("fig05", "couplings"),
-                                              ("scenes", "scenes"), ("hero", "peg_in_the_corner")])  # fmt: skip
+@pytest.mark.parametrize(
+    ("figure", "name"),
+    [
+        ("fig01", "impulses_and_forces"),
+        ("fig05", "couplings"),
+        ("scenes", "scenes"),
+        ("hero", "peg_in_the_corner"),
+    ],
+)
 def test_pictures_show_the_runs_of_today(figure, name, shared):
     """What they say of themselves in words and numbers, such as the forces at the contacts."""
     drawn = shared / "figures" / f"{figure}.svg"
@@ -153,6 +206,8 @@ def test_pictures_show_the_runs_of_today(figure, name, shared):
         drawn.write_text(standalone(draw(hero, {TILTED: {start.tilt: runs}})), encoding="utf-8")
     else:
         assert main(["reproduce", "--figure", figure, "--out", str(drawn.parent)]) == 0
-    said, shown = (re.findall(r"<desc>(.*?)</desc>", path.read_text(encoding="utf-8"), flags=re.S)[0]
-                   for path in (drawn, PICTURES / f"{name}.svg"))  # fmt: skip
+    said, shown = (
+        re.findall(r"<desc>(.*?)</desc>", path.read_text(encoding="utf-8"), flags=re.S)[0]
+        for path in (drawn, PICTURES / f"{name}.svg")
+    )
     assert not differs(said, shown), f"draw it again: iapb reproduce --figure {figure}"

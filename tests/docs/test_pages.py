@@ -1,4 +1,5 @@
-"""The pages of docs/ and the code speak of the same things: links, equations, notation, and the reference."""
+"""The pages of docs/ and the code speak of the same things: links, equations, notation, and the
+reference."""
 
 import inspect
 import re
@@ -14,10 +15,17 @@ ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("iapb", "reference", "verification", "reports")
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 NOTATION = (ROOT / "docs/notation.md").read_text(encoding="utf-8")
-EQUATIONS = re.findall(r"^\| \((\d+)\) \|.*?\| ([^|]+) \|$", (ROOT / "docs/equations.md").read_text(encoding="utf-8"),
-                       flags=re.MULTILINE)  # fmt: skip
+EQUATIONS = re.findall(
+    r"^\| \((\d+)\) \|.*?\| ([^|]+) \|$",
+    (ROOT / "docs/equations.md").read_text(encoding="utf-8"),
+    flags=re.MULTILINE,
+)
 API = sorted((ROOT / "docs/api").glob("*.md"))
-PUBLIC = [(package, name) for package in PACKAGES for name in getattr(import_module(package), "__all__", ())]
+PUBLIC = [
+    (package, name)
+    for package in PACKAGES
+    for name in getattr(import_module(package), "__all__", ())
+]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
@@ -27,9 +35,17 @@ def test_links_lead_somewhere(page):
         found = (page.parent / path) if path else page
         if not target.startswith("http"):
             assert found.exists(), f"{page.name}: {target} leads nowhere"
-            headings = re.findall(r"^#+ (.+)$", found.read_text(encoding="utf-8"), flags=re.M) if anchor else []
-            anchors = {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
-            assert not anchor or anchor in anchors, f"{page.name}: {found.name} has no heading for #{anchor}"
+            headings = (
+                re.findall(r"^#+ (.+)$", found.read_text(encoding="utf-8"), flags=re.M)
+                if anchor
+                else []
+            )
+            anchors = {
+                re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings
+            }
+            assert not anchor or anchor in anchors, (
+                f"{page.name}: {found.name} has no heading for #{anchor}"
+            )
 
 
 def test_every_equation_has_its_row_and_its_links_lead_to_functions_or_statements():
@@ -37,25 +53,46 @@ def test_every_equation_has_its_row_and_its_links_lead_to_functions_or_statement
     for number, row in EQUATIONS:
         links = re.findall(r"`([\w/]+\.(?:py|txt)):(\w+)`", row)
         assert links or row.startswith("not used, because "), number
-        assert len(links) == len(re.findall(r"\.(?:py|txt)", row)), f"({number}): a path without a function"
+        assert len(links) == len(re.findall(r"\.(?:py|txt)", row)), (
+            f"({number}): a path without a function"
+        )
         for file, name in links:
             defined = re.compile(rf"^(?:\s*(?:async )?def |class |){name}\b", flags=re.M)
-            assert defined.search((ROOT / file).read_text(encoding="utf-8")), f"({number}): {file}:{name}"
+            assert defined.search((ROOT / file).read_text(encoding="utf-8")), (
+                f"({number}): {file}:{name}"
+            )
 
 
 def test_the_names_and_units_of_notation_are_those_of_the_code_and_the_run_files():
     ledger = set(simulate(find_scene("peg_corner"), steps=1).energy)
-    code = "\n".join(path.read_text() for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
-    words, names = set(re.findall(r"\w+", code)) | ledger, set(re.findall(r"`([A-Za-z_][\w.]*)`", NOTATION))
+    code = "\n".join(
+        path.read_text() for package in PACKAGES for path in (ROOT / package).rglob("*.py")
+    )
+    words, names = (
+        set(re.findall(r"\w+", code)) | ledger,
+        set(re.findall(r"`([A-Za-z_][\w.]*)`", NOTATION)),
+    )
     assert len(names) > 50 and not {name for name in names if not set(name.split(".")) <= words}
     assert not [name for name in ledger if f"`{name}`" not in NOTATION]
-    rows = [[cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in NOTATION.splitlines()]
+    rows = [
+        [cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]]
+        for line in NOTATION.splitlines()
+    ]
     for quantity in (quantity for quantities, _ in GROUPS.values() for quantity in quantities):
-        units = {unit.strip().replace("–", "1") for cells in rows
-                 if len(cells) == 5 and f"`{quantity.name}`" in cells[1]
-                 for unit in re.split(r"\\\||,", cells[2])}  # fmt: skip
-        wanted = {quantity.unit} if isinstance(quantity.unit, str) else set(quantity.unit.values()) - {"1"}
-        assert units and wanted <= units, f"{quantity.name}: the page says {units}, the file {wanted}"
+        units = {
+            unit.strip().replace("–", "1")
+            for cells in rows
+            if len(cells) == 5 and f"`{quantity.name}`" in cells[1]
+            for unit in re.split(r"\\\||,", cells[2])
+        }
+        wanted = (
+            {quantity.unit}
+            if isinstance(quantity.unit, str)
+            else set(quantity.unit.values()) - {"1"}
+        )
+        assert units and wanted <= units, (
+            f"{quantity.name}: the page says {units}, the file {wanted}"
+        )
 
 
 def public_functions(module):
@@ -64,8 +101,11 @@ def public_functions(module):
         if name.startswith("_") or getattr(value, "__module__", "") != module.__name__:
             continue
         inside = vars(value).items() if inspect.isclass(value) else [("", value)]
-        yield from ((f"{name}.{inner}", function) for inner, function in inside
-                    if inspect.isfunction(function) and not inner.startswith("_"))  # fmt: skip
+        yield from (
+            (f"{name}.{inner}", function)
+            for inner, function in inside
+            if inspect.isfunction(function) and not inner.startswith("_")
+        )
 
 
 @pytest.mark.parametrize("page", API, ids=lambda page: page.stem)
@@ -74,7 +114,9 @@ def test_whatever_the_reference_shows_has_a_docstring(page):
     for name in re.findall(r"automodule:: ([\w.]+)", page.read_text(encoding="utf-8")):
         module = import_module(name)
         assert module.__doc__
-        assert not [place for place, function in public_functions(module) if not inspect.getdoc(function)]
+        assert not [
+            place for place, function in public_functions(module) if not inspect.getdoc(function)
+        ]
 
 
 @pytest.mark.parametrize(("package", "name"), PUBLIC, ids=[".".join(each) for each in PUBLIC])
@@ -83,9 +125,23 @@ def test_names_of_the_packages_say_what_goes_in_and_out(package, name):
     text = inspect.getdoc(value) or ""
     assert text or not inspect.isclass(value)
     if inspect.isfunction(value):
-        signature, raises = inspect.signature(value), re.search(r"^\s+raise ", inspect.getsource(value), flags=re.M)
-        wanted = {"Parameters": signature.parameters, "Raises": raises,
-                  "Returns": signature.return_annotation not in (None, "None")}  # fmt: skip
-        lacking = [part for part in wanted if wanted[part] and not re.search(rf"^{part}\n-+$", text, flags=re.M)]
-        lacking += [one for one in signature.parameters if not re.search(rf"^\s*(\w+, )*{one}\b", text, flags=re.M)]
+        signature, raises = (
+            inspect.signature(value),
+            re.search(r"^\s+raise ", inspect.getsource(value), flags=re.M),
+        )
+        wanted = {
+            "Parameters": signature.parameters,
+            "Raises": raises,
+            "Returns": signature.return_annotation not in (None, "None"),
+        }
+        lacking = [
+            part
+            for part in wanted
+            if wanted[part] and not re.search(rf"^{part}\n-+$", text, flags=re.M)
+        ]
+        lacking += [
+            one
+            for one in signature.parameters
+            if not re.search(rf"^\s*(\w+, )*{one}\b", text, flags=re.M)
+        ]
         assert not lacking

@@ -1,6 +1,7 @@
 """Print hashes of short runs and of 200 impacts as JSON: the same on every processor.
 
-The numbers of the impacts are small integers over powers of two, so that they are the same everywhere, too.
+The numbers of the impacts are small integers over powers of two, so that they are the same
+everywhere, too.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ GAINS = FourChannel((100.0, 100.0, 0.5), (70.0, 70.0, 0.375))
 
 
 def hashes() -> dict[str, str]:
-    """Return two hashes for each scene's run, as shipped and with implicit contact, and one for each kind of impact."""
+    """Return two hashes for each scene's run, as shipped and with implicit contact, and one for
+    each kind of impact."""
     found = {path.stem: _run_hash(load_scene(path)) for path in sorted(SCENES.glob("*.yaml"))}
     for path in sorted(SCENES.glob("*.yaml")):
         scene = load_scene(path).with_values({"contact.forces": "implicit"})
@@ -36,13 +38,19 @@ def hashes() -> dict[str, str]:
     found["factored"] = _hash([(answer.velocity, answer.impulses) for answer in answers])
     poisson = [resolve_impact(M, J, v, np.arange(len(J)) / 16.0) for M, J, v in _impacts()]
     found["poisson"] = _hash([(answer.velocity, answer.impulses) for answer in poisson])
-    rough = [resolve_frictional_impact(M, J, np.roll(J, 1, axis=1), v, 0.5, 0.25) for M, J, v in _impacts()]
-    found["friction"] = _hash([(answer.velocity, answer.impulses, answer.tangential_impulses) for answer in rough])
+    rough = [
+        resolve_frictional_impact(M, J, np.roll(J, 1, axis=1), v, 0.5, 0.25)
+        for M, J, v in _impacts()
+    ]
+    found["friction"] = _hash(
+        [(answer.velocity, answer.impulses, answer.tangential_impulses) for answer in rough]
+    )
     return found
 
 
 def _impacts() -> Any:
-    """Yield 200 impacts on 2 to 7 coordinates with 1 to 8 rows, some of them dependent, of unequal size."""
+    """Yield 200 impacts on 2 to 7 coordinates with 1 to 8 rows, some of them dependent, of unequal
+    size."""
     numbers = np.random.default_rng(13)
     for k in range(200):
         d, c = 2 + k % 6, 1 + k % 8
@@ -52,7 +60,9 @@ def _impacts() -> Any:
 
 
 def _device_hash() -> str:
-    device = SimulatedDevice([[2.0, 0.3, 0.1], [0.3, 1.5, 0.2], [0.1, 0.2, 0.7]], np.zeros(3), dt=1e-3)
+    device = SimulatedDevice(
+        [[2.0, 0.3, 0.1], [0.3, 1.5, 0.2], [0.1, 0.2, 0.7]], np.zeros(3), dt=1e-3
+    )
     for k in range(50):
         device.apply([0.1 * k, -0.3, 1.0 / (k + 1)])
     return _hash([device.q, device.v])
@@ -60,7 +70,9 @@ def _device_hash() -> str:
 
 def _run_hash(scene: Any, **options: Any) -> str:
     run = simulate(scene, steps=min(STEPS, scene.steps), **options)
-    return _hash([getattr(run, field.name) for field in fields(run) if not field.name.startswith("chunk_")])
+    return _hash(
+        [getattr(run, field.name) for field in fields(run) if not field.name.startswith("chunk_")]
+    )
 
 
 def _hash(value: Any) -> str:

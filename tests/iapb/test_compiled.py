@@ -1,4 +1,5 @@
-"""Blocks hand whole rooms of arrays to kernels; kernels cannot allocate, and that is checked by the compiler."""
+"""Blocks hand whole rooms of arrays to kernels; kernels cannot allocate, and that is checked by the
+compiler."""
 
 from __future__ import annotations
 
@@ -33,13 +34,18 @@ def test_a_kernel_that_would_allocate_does_not_compile(function):
         kernel(function)(np.array([1.0, 2.0, 3.0]))
 
 
-@pytest.mark.parametrize("function", [lambda x: x[1:][0], lambda x: (x[0], x[1])[1]])  # neither a slice nor a tuple
+@pytest.mark.parametrize(
+    "function", [lambda x: x[1:][0], lambda x: (x[0], x[1])[1]]
+)  # neither a slice nor a tuple
 def test_a_kernel_without_allocation_compiles_without_fastmath(function):
     x = np.array([1.0, 2.0, 3.0])
-    assert kernel(function)(x) == function(x) and kernel(function).targetoptions["fastmath"] is False
+    assert (
+        kernel(function)(x) == function(x) and kernel(function).targetoptions["fastmath"] is False
+    )
 
 
-# --- blocks -----------------------------------------------------------------------------------------------------------
+# --- blocks
+# -----------------------------------------------------------------------------------------------------------
 
 
 class Inner(NamedTuple):
@@ -59,7 +65,11 @@ def read(b):
 
 
 def outer(**values):
-    given = {"count": 3, "inner": Inner(True, np.arange(6.0).reshape(2, 3)), "small": np.array([7], np.int8)}
+    given = {
+        "count": 3,
+        "inner": Inner(True, np.arange(6.0).reshape(2, 3)),
+        "small": np.array([7], np.int8),
+    }
     return Outer(**given | values)
 
 
@@ -89,19 +99,33 @@ def test_types_of_blocks_differ_where_their_fields_do_and_survive_a_file():
 def test_the_stamp_of_kernels_covers_every_file_whose_constants_they_read():
     """Else a changed constant would leave the machine code made with the old one in use."""
     stamped = set(_stamped_files())
-    assert stamped >= {ENGINE / name for name in ("contact/geometry.py", "run.py", "compiled.py", "inlining.py")}
+    assert stamped >= {
+        ENGINE / name for name in ("contact/geometry.py", "run.py", "compiled.py", "inlining.py")
+    }
     for path in stamped:
         for node in ast.walk(ast.parse(path.read_text())):
-            constants = [name.name for name in getattr(node, "names", ()) if isinstance(node, ast.ImportFrom)
-                         and str(node.module).startswith("iapb") and name.name.lstrip("_").isupper()]
-            home = ENGINE.parent.joinpath(*str(getattr(node, "module", "")).split(".")).with_suffix(".py")
-            assert home in stamped or set(constants) <= {"FORCES"}, (path, constants)  # those Python reads
+            constants = [
+                name.name
+                for name in getattr(node, "names", ())
+                if isinstance(node, ast.ImportFrom)
+                and str(node.module).startswith("iapb")
+                and name.name.lstrip("_").isupper()
+            ]
+            home = ENGINE.parent.joinpath(*str(getattr(node, "module", "")).split(".")).with_suffix(
+                ".py"
+            )
+            assert home in stamped or set(constants) <= {"FORCES"}, (
+                path,
+                constants,
+            )  # those Python reads
 
 
 def test_a_kernel_outside_the_engine_is_compiled_anew_when_its_own_file_changes(tmp_path):
     path, x = tmp_path / "own_kernel.py", np.array([2.0])
     for factor in (3.0, 5.0):
-        path.write_text(f"from iapb.compiled import kernel\n\n\n@kernel\ndef scaled(x):\n    return {factor} * x[0]\n")
+        path.write_text(
+            f"from iapb.compiled import kernel\n\n\n@kernel\ndef scaled(x):\n    return {factor} * x[0]\n"
+        )
         spec = importlib.util.spec_from_file_location("own_kernel", path)
         module = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(module)
@@ -124,8 +148,14 @@ def calling(flags, x):
 
 
 @pytest.mark.parametrize("how", ["lean", "whole"])
-def test_a_kernel_whose_flags_are_all_off_is_not_compiled(how: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_kernel_whose_flags_are_all_off_is_not_compiled(
+    how: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("IAPB_COMPILE", how)
-    found = {(a, b): calling(block(Flags(flag(a), flag(b))), 3) for a in (False, True) for b in (False, True)}
+    found = {
+        (a, b): calling(block(Flags(flag(a), flag(b))), 3)
+        for a in (False, True)
+        for b in (False, True)
+    }
     off = -1 if how == "lean" else 3
     assert found == {(False, False): off, (False, True): 3, (True, False): 13, (True, True): 13}

@@ -1,4 +1,5 @@
-"""Arithmetic without libm and BLAS against exact numbers: functions, double-double sums, small matrices."""
+"""Arithmetic without libm and BLAS against exact numbers: functions, double-double sums, small
+matrices."""
 
 from __future__ import annotations
 
@@ -17,15 +18,34 @@ from iapb.double_double import add_product, kinetic_energies, quadratic_forms, t
 from iapb.elementary import arc_tangent, hypotenuse, sine_cosine
 
 NUMBERS = np.random.default_rng(8)
-ANGLES = np.concatenate([
-    NUMBERS.uniform(-4.0, 4.0, 2000), NUMBERS.uniform(-1e6, 1e6, 500), NUMBERS.uniform(-1.0, 1.0, 200) * 2.0**30,
-    10.0 ** NUMBERS.uniform(-300.0, 0.0, 200), np.arange(-60, 61) * (math.pi / 4), [5e-324, 0.0, 1e-8],
-])
-POINTS = np.concatenate([
-    NUMBERS.normal(size=(2000, 2)), NUMBERS.normal(size=(400, 2)) * 10.0 ** NUMBERS.uniform(-20.0, 20.0, (400, 2)),
-    NUMBERS.normal(size=(50, 2)) * 1e-320, NUMBERS.normal(size=(50, 2)) * 1e300,
-    [[0.0, -1.0], [1.0, 0.0], [-1.0, 0.0], [1.0, 1.0], [-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [0.0, 1.0]],
-])
+ANGLES = np.concatenate(
+    [
+        NUMBERS.uniform(-4.0, 4.0, 2000),
+        NUMBERS.uniform(-1e6, 1e6, 500),
+        NUMBERS.uniform(-1.0, 1.0, 200) * 2.0**30,
+        10.0 ** NUMBERS.uniform(-300.0, 0.0, 200),
+        np.arange(-60, 61) * (math.pi / 4),
+        [5e-324, 0.0, 1e-8],
+    ]
+)
+POINTS = np.concatenate(
+    [
+        NUMBERS.normal(size=(2000, 2)),
+        NUMBERS.normal(size=(400, 2)) * 10.0 ** NUMBERS.uniform(-20.0, 20.0, (400, 2)),
+        NUMBERS.normal(size=(50, 2)) * 1e-320,
+        NUMBERS.normal(size=(50, 2)) * 1e300,
+        [
+            [0.0, -1.0],
+            [1.0, 0.0],
+            [-1.0, 0.0],
+            [1.0, 1.0],
+            [-1.0, 1.0],
+            [1.0, -1.0],
+            [-1.0, -1.0],
+            [0.0, 1.0],
+        ],
+    ]
+)
 
 
 def _rounded(function: Callable[..., object], *values: float) -> float:
@@ -33,12 +53,18 @@ def _rounded(function: Callable[..., object], *values: float) -> float:
         return float(function(*(mpmath.mpf(float(value)) for value in values)))
 
 
-@pytest.mark.parametrize(("own", "exact", "inputs"), [
-    (lambda x: sine_cosine(x)[0], mpmath.sin, ANGLES[:, None]),
-    (lambda x: sine_cosine(x)[1], mpmath.cos, ANGLES[:, None]),
-    (arc_tangent, mpmath.atan2, POINTS), (hypotenuse, mpmath.hypot, POINTS),
-])
-def test_functions_are_rounded_correctly(own: Any, exact: Callable[..., object], inputs: np.ndarray) -> None:
+@pytest.mark.parametrize(
+    ("own", "exact", "inputs"),
+    [
+        (lambda x: sine_cosine(x)[0], mpmath.sin, ANGLES[:, None]),
+        (lambda x: sine_cosine(x)[1], mpmath.cos, ANGLES[:, None]),
+        (arc_tangent, mpmath.atan2, POINTS),
+        (hypotenuse, mpmath.hypot, POINTS),
+    ],
+)
+def test_functions_are_rounded_correctly(
+    own: Any, exact: Callable[..., object], inputs: np.ndarray
+) -> None:
     assert [own(*given) for given in inputs] == [_rounded(exact, *given) for given in inputs]
 
 
@@ -51,7 +77,9 @@ def test_signs_of_zero_are_those_of_the_c_library() -> None:
 def test_angles_beyond_all_turns_and_what_is_not_finite() -> None:
     for angle in (1e12, -3e15, 1e300):
         assert sine_cosine(angle) == sine_cosine(math.fmod(angle, 2.0 * math.pi))
-    assert all(math.isnan(value) for x in (math.inf, -math.inf, math.nan) for value in sine_cosine(x))
+    assert all(
+        math.isnan(value) for x in (math.inf, -math.inf, math.nan) for value in sine_cosine(x)
+    )
     assert hypotenuse(-math.inf, 1.0) == math.inf and math.isnan(hypotenuse(math.nan, 1.0))
 
 
@@ -74,11 +102,14 @@ def test_accumulation_keeps_a_hundred_bits(a: float, b: float, c: float) -> None
 
 def exact_form(mass: np.ndarray, x: np.ndarray, y: np.ndarray) -> Fraction:
     d = len(x)
-    return sum(Fraction(x[i]) * Fraction(mass[i, j]) * Fraction(y[j]) for i in range(d) for j in range(d))
+    return sum(
+        Fraction(x[i]) * Fraction(mass[i, j]) * Fraction(y[j]) for i in range(d) for j in range(d)
+    )
 
 
 def graded(seed: int, d: int = 6) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """κ(M) = 1e14 and two velocities that differ in the last digits: what cancels in plain doubles."""
+    """κ(M) = 1e14 and two velocities that differ in the last digits: what cancels in plain
+    doubles."""
     rng = np.random.default_rng(seed)
     basis = np.linalg.qr(rng.normal(size=(d, d)))[0]
     mass = basis * np.logspace(0, -14, d) @ basis.T

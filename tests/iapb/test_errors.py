@@ -46,14 +46,27 @@ def test_a_value_that_cannot_travel_travels_as_text() -> None:
 SCENES = ("peg_corner", "peg_hole", "two_discs")
 
 
-@pytest.mark.parametrize(("wrong", "right"), [
-    ("peg_cornr", "peg_corner"), ("PEG_HOLE", "peg_hole"), ("twodiscs", "two_discs"), ("submarine", ""), ("", ""),
-    (3, ""), (None, ""),
-])
+@pytest.mark.parametrize(
+    ("wrong", "right"),
+    [
+        ("peg_cornr", "peg_corner"),
+        ("PEG_HOLE", "peg_hole"),
+        ("twodiscs", "two_discs"),
+        ("submarine", ""),
+        ("", ""),
+        (3, ""),
+        (None, ""),
+    ],
+)
 def test_the_nearest_name_is_found_whatever_its_capitals(wrong, right):
     assert nearest(wrong, SCENES) == right and nearest("iapb", ["ideal", "IAPB", "PB"]) == "IAPB"
 
 
 def test_all_names_are_listed_and_the_guess_comes_last():
-    assert one_of("peg_cornr", SCENES) == "one of peg_corner, peg_hole, two_discs; did you mean peg_corner?"
-    assert one_of("submarine", SCENES, "a file, or: ") == "a file, or: peg_corner, peg_hole, two_discs"
+    assert (
+        one_of("peg_cornr", SCENES)
+        == "one of peg_corner, peg_hole, two_discs; did you mean peg_corner?"
+    )
+    assert (
+        one_of("submarine", SCENES, "a file, or: ") == "a file, or: peg_corner, peg_hole, two_discs"
+    )

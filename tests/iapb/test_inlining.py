@@ -48,8 +48,11 @@ def _sum(values: Any) -> Any:
     return total - _entry(values, 0) * _entry(values, 0)
 
 
-def test_what_a_kernel_calls_is_inlined_or_has_no_name_for_other_libraries(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The loader would take it for its own of that name, though LLVM may have changed how it is called."""
+def test_what_a_kernel_calls_is_inlined_or_has_no_name_for_other_libraries(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The loader would take it for its own of that name, though LLVM may have changed how it is
+    called."""
     monkeypatch.setattr("iapb.inlining._INLINE_UP_TO", -10_000)
     caller = compile_as_whole(_sum.py_func)
     assert caller(np.array([1.0, 2.0])) == 4.0

@@ -1,4 +1,5 @@
-"""The engine works without the packages of the extras, and whoever lacks one reads which extra brings it."""
+"""The engine works without the packages of the extras, and whoever lacks one reads which extra
+brings it."""
 
 from __future__ import annotations
 
@@ -29,15 +30,24 @@ sys.meta_path.insert(0, Missing())
 
 def run_without(missing: set[str], code: str) -> subprocess.CompletedProcess[str]:
     """Run code in a new interpreter in which these packages cannot be imported."""
-    return subprocess.run([sys.executable, "-c", WITHOUT.format(missing=missing) + code], cwd=ROOT, capture_output=True,
-                          text=True)  # fmt: skip
+    return subprocess.run(
+        [sys.executable, "-c", WITHOUT.format(missing=missing) + code],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+    )
 
 
 def test_the_extras_of_the_messages_are_those_of_the_project() -> None:
-    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
-    bring = {IMPORTED_AS.get(name, name): extra
-             for extra in ("reference", "verify", "report", "all") for line in extras[extra]
-             if not (name := line.partition(">")[0]).startswith("iapb")}  # fmt: skip
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"][
+        "optional-dependencies"
+    ]
+    bring = {
+        IMPORTED_AS.get(name, name): extra
+        for extra in ("reference", "verify", "report", "all")
+        for line in extras[extra]
+        if not (name := line.partition(">")[0]).startswith("iapb")
+    }
     assert bring == EXTRAS
 
 
@@ -46,12 +56,25 @@ from iapb import find_scene, resolve_impact, simulate
 print(simulate(find_scene("peg_corner"), steps=5).steps, resolve_impact([[1.0]], [[1.0]], [-1.0], 0.0).velocity)
 """
 TOLD = "{} needs {}, which is not installed. Install it with: pip install '.[{}]' (in a checkout of iapb)"
-NEEDS = [("from iapb import simulate; simulate('peg_corner', world='ideal', steps=5)", "A reference", "scipy"),
-         ("from iapb import simulate; simulate('peg_corner', steps=5).save('never.h5')", "Run.save", "h5py"),
-         ("from verification import check_passivity", "verification.check_passivity", "hypothesis"),
-         ("from iapb.__main__ import main; print(main())", "iapb: The command", "typer")]
-COMMANDS = {"inspect run.h5": ("h5py", "reference"),
-            "verify": ("hypothesis", "verify"), "reproduce": ("jinja2", "report")}
+NEEDS = [
+    (
+        "from iapb import simulate; simulate('peg_corner', world='ideal', steps=5)",
+        "A reference",
+        "scipy",
+    ),
+    (
+        "from iapb import simulate; simulate('peg_corner', steps=5).save('never.h5')",
+        "Run.save",
+        "h5py",
+    ),
+    ("from verification import check_passivity", "verification.check_passivity", "hypothesis"),
+    ("from iapb.__main__ import main; print(main())", "iapb: The command", "typer"),
+]
+COMMANDS = {
+    "inspect run.h5": ("h5py", "reference"),
+    "verify": ("hypothesis", "verify"),
+    "reproduce": ("jinja2", "report"),
+}
 
 
 def test_simulate_and_resolve_need_no_extra_and_what_does_says_which_in_one_sentence() -> None:
@@ -64,14 +87,18 @@ for code in {[code for code, *_ in NEEDS]!r}:
 """
     done = run_without(set(EXTRAS), WORKS + each)
     assert done.stdout == "5 [0.]\n1\n", done.stderr
-    said = [line for line in done.stderr.splitlines() if not line.startswith("Compiling ")]  # without a cache
+    said = [
+        line for line in done.stderr.splitlines() if not line.startswith("Compiling ")
+    ]  # without a cache
     assert said == [TOLD.format(who, package, EXTRAS[package]) for _, who, package in NEEDS]
 
 
 @pytest.mark.parametrize("line", COMMANDS)
 def test_a_command_without_its_extra_ends_before_it_computes_and_names_it(line: str) -> None:
     package, extra = COMMANDS[line]
-    done = run_without({package}, f"from reports.cli import main; raise SystemExit(main({line.split()!r}))")
+    done = run_without(
+        {package}, f"from reports.cli import main; raise SystemExit(main({line.split()!r}))"
+    )
     assert done.returncode == 1 and done.stdout == "", done
     assert done.stderr == "iapb: " + TOLD.format("The command", package, extra) + "\n"
 
@@ -83,14 +110,21 @@ def test_a_foreign_package_of_the_same_name_is_named(name: str, own: str, tmp_pa
     file.touch()
     start = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); "
     foreign = file.parent if file.name == "__init__.py" else file
-    for code in ("from iapb.__main__ import main; raise SystemExit(main())",
-                 "from iapb.lazy import needed; needed('verification.laws.kit', 'The fixture iapb_law')"):
+    for code in (
+        "from iapb.__main__ import main; raise SystemExit(main())",
+        "from iapb.lazy import needed; needed('verification.laws.kit', 'The fixture iapb_law')",
+    ):
         done = run_without(set(), start + code)
         assert done.returncode == 1
-        assert f"{foreign} hides the package {ROOT / name}" in done.stderr and "Rename yours" in done.stderr
+        assert (
+            f"{foreign} hides the package {ROOT / name}" in done.stderr
+            and "Rename yours" in done.stderr
+        )
 
 
-def test_a_linked_folder_of_ours_hides_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_linked_folder_of_ours_hides_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "link").symlink_to(ROOT)
     monkeypatch.setattr(lazy, "__file__", str(tmp_path / "link" / "iapb" / "lazy.py"))
     assert lazy.hidden_package() == ""

@@ -29,7 +29,11 @@ def results_of(record, place="run"):
         if is_dataclass(value):
             found |= results_of(value, field.name)
         elif isinstance(value, dict):
-            found |= {f"{field.name}/{key}": each for key, each in value.items() if isinstance(each, np.ndarray)}
+            found |= {
+                f"{field.name}/{key}": each
+                for key, each in value.items()
+                if isinstance(each, np.ndarray)
+            }
         elif isinstance(value, np.ndarray) and not field.name.startswith("chunk"):
             found[f"{place}/{field.name}"] = value
     return found
@@ -61,8 +65,10 @@ def test_a_run_has_the_same_bits_whatever_its_chunks_and_records(monkeypatch, by
     assert_same(whole, chunked)
 
 
-@pytest.mark.parametrize(("name", "coupling"), [
-    ("peg_corner", "four-channel"), ("peg_corner", "unilateral"), ("two_discs", "none")])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "coupling"),
+    [("peg_corner", "four-channel"), ("peg_corner", "unilateral"), ("two_discs", "none")],
+)
 def test_a_thinned_run_keeps_every_nth_step_and_those_with_an_impact(name, coupling, monkeypatch):
     scene = load_scene(find_scene(name))
     coupled = coupling_of(scene, coupling)
@@ -76,17 +82,30 @@ def test_a_thinned_run_keeps_every_nth_step_and_those_with_an_impact(name, coupl
     expected |= {each.name: getattr(whole, each.name)[instants] for each in quantities(Run, "time")}
     for each, values in expected.items():
         assert np.array_equal(getattr(thin, each), values), each
-    assert np.array_equal(thin.time, whole.time[instants]) and thin.energy.keys() == whole.energy.keys()
+    assert (
+        np.array_equal(thin.time, whole.time[instants])
+        and thin.energy.keys() == whole.energy.keys()
+    )
     for each, full in whole.energy.items():  # sums reach up to the next instant
-        assert np.array_equal(thin.energy[each], full[instants] if len(full) > 1400 else full[instants[1:] - 1]), each
+        assert np.array_equal(
+            thin.energy[each], full[instants] if len(full) > 1400 else full[instants[1:] - 1]
+        ), each
     for i, k in enumerate(kept):
-        ours, theirs = (slice(*run.contacts.offsets[at : at + 2]) for run, at in ((thin, i), (whole, k)))
+        ours, theirs = (
+            slice(*run.contacts.offsets[at : at + 2]) for run, at in ((thin, i), (whole, k))
+        )
         assert np.array_equal(thin.contacts.gap[ours], whole.contacts.gap[theirs])
     assert np.array_equal(kept[thin.impacts.step], whole.impacts.step)
     for each in quantities(type(whole.impacts)):
         if each.name != "step":
-            assert np.array_equal(getattr(thin.impacts, each.name), getattr(whole.impacts, each.name)), each.name
-    assert thin.chunk_steps.sum() == 1400 and thin.distrust == whole.distrust and thin.remarks == whole.remarks
+            assert np.array_equal(
+                getattr(thin.impacts, each.name), getattr(whole.impacts, each.name)
+            ), each.name
+    assert (
+        thin.chunk_steps.sum() == 1400
+        and thin.distrust == whole.distrust
+        and thin.remarks == whole.remarks
+    )
 
 
 def test_a_thinned_run_that_is_interrupted_keeps_the_last_state(monkeypatch):
@@ -97,7 +116,11 @@ def test_a_thinned_run_that_is_interrupted_keeps_the_last_state(monkeypatch):
     monkeypatch.setattr(recording, "_PIECE", 1)
     whole = simulate("peg_corner", steps=1024)
     thin = simulate("peg_corner", steps=1400, every=10, progress=interrupt)
-    assert thin.stopped == INTERRUPTED and thin.steps_done == 1024 and np.array_equal(thin.q[-1], whole.q[-1])
+    assert (
+        thin.stopped == INTERRUPTED
+        and thin.steps_done == 1024
+        and np.array_equal(thin.q[-1], whole.q[-1])
+    )
 
 
 def test_what_an_earlier_piece_distrusts_is_kept():

@@ -1,6 +1,8 @@
-"""The engine gives the same bits with any BLAS kernel, any instruction set of numpy, any code of the C library.
+"""The engine gives the same bits with any BLAS kernel, any instruction set of numpy, any code of
+the C library.
 
-Machine code of the kernels for another processor (`NUMBA_CPU_NAME=generic`) takes minutes to compile: not here.
+Machine code of the kernels for another processor (`NUMBA_CPU_NAME=generic`) takes minutes to
+compile: not here.
 """
 
 from __future__ import annotations
@@ -26,7 +28,9 @@ SETTINGS = {
 
 def _hashes(settings: dict[str, str]) -> dict[str, str]:
     command = [sys.executable, same_bits.__file__]
-    done = subprocess.run(command, env=os.environ | settings, capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        command, env=os.environ | settings, capture_output=True, text=True, check=True
+    )
     return dict(json.loads(done.stdout))
 
 

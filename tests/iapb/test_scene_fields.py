@@ -1,4 +1,5 @@
-"""Friction by body and pair, a hand's force over time, damping and limits of joints: each against a law of its own."""
+"""Friction by body and pair, a hand's force over time, damping and limits of joints: each against a
+law of its own."""
 
 from __future__ import annotations
 
@@ -24,15 +25,23 @@ PEG = load_scene(find_scene("peg_corner"))
 # Friction
 
 
-@pytest.mark.parametrize(("peg", "floor", "general", "expected"), [
-    (0.5, 0.5, 0.0, 0.5), (0.2, 0.8, 0.3, 0.4), (0.25, None, 0.7, 0.25),
-    (None, 0.25, 0.7, 0.25), (0.0, 0.9, 0.5, 0.0), (None, None, 0.3, 0.3),
-])
+@pytest.mark.parametrize(
+    ("peg", "floor", "general", "expected"),
+    [
+        (0.5, 0.5, 0.0, 0.5),
+        (0.2, 0.8, 0.3, 0.4),
+        (0.25, None, 0.7, 0.25),
+        (None, 0.25, 0.7, 0.25),
+        (0.0, 0.9, 0.5, 0.0),
+        (None, None, 0.3, 0.3),
+    ],
+)
 def test_of_two_values_the_geometric_mean_counts(
     peg: float | None, floor: float | None, general: float, expected: float
 ) -> None:
-    scene = PEG.with_values({
-        "bodies.peg.friction": peg, "walls.floor.friction": floor, "contact.friction": general})
+    scene = PEG.with_values(
+        {"bodies.peg.friction": peg, "walls.floor.friction": floor, "contact.friction": general}
+    )
     found = frictions_of(scene).by_pair(pairs_of(scene, shapes_of(scene)))  # right wall, floor
     assert found == pytest.approx([general if peg is None else peg, expected], rel=1e-15)
 
@@ -47,16 +56,40 @@ def pushed(**values: Any) -> Scene:
 
 
 def test_a_table_is_linear_between_its_rows_and_constant_outside() -> None:
-    forces = np.array([*map(pushed(**{"hand.force_table": TABLE}).hand.force_at, [0.0, 0.1, 0.15, 0.2, 0.3, 0.4, 9.0])])
-    expected = [[0, 0, 0], [0, 0, 0], [0.5, -1, 0.05], [1, -2, 0.1], [2, -1, 0.05], [3, 0, 0], [3, 0, 0]]
+    forces = np.array(
+        [
+            *map(
+                pushed(**{"hand.force_table": TABLE}).hand.force_at,
+                [0.0, 0.1, 0.15, 0.2, 0.3, 0.4, 9.0],
+            )
+        ]
+    )
+    expected = [
+        [0, 0, 0],
+        [0, 0, 0],
+        [0.5, -1, 0.05],
+        [1, -2, 0.1],
+        [2, -1, 0.05],
+        [3, 0, 0],
+        [3, 0, 0],
+    ]
     assert np.allclose(forces, expected, rtol=1e-14, atol=1e-15)
 
 
 def test_the_record_has_the_force_of_each_steps_middle_and_steps_alone_give_the_same_bits() -> None:
-    scene = pushed(**{"hand.force_table": TABLE, "hand.force_function": ["0.1*sin(2*pi*t)", 0, "step(t - 0.5)/100"]})
+    scene = pushed(
+        **{
+            "hand.force_table": TABLE,
+            "hand.force_function": ["0.1*sin(2*pi*t)", 0, "step(t - 0.5)/100"],
+        }
+    )
     run, alone = simulate(scene, ImpulseAugmented()), Simulation(scene)
-    expected = np.array([*map(scene.hand.force_at, ((np.arange(run.steps) + 0.5) * run.dt).tolist())])
-    assert np.array_equal(run.hand_force, expected)  # the peg's coordinates are the hand's axes; three chunks
+    expected = np.array(
+        [*map(scene.hand.force_at, ((np.arange(run.steps) + 0.5) * run.dt).tolist())]
+    )
+    assert np.array_equal(
+        run.hand_force, expected
+    )  # the peg's coordinates are the hand's axes; three chunks
     states = np.array([alone.step().q for _ in range(700)])
     assert np.array_equal(states, run.q[1:701])
     alone.step(hand_force=[0.0, 0.0, 0.0])
@@ -66,10 +99,14 @@ def test_the_record_has_the_force_of_each_steps_middle_and_steps_alone_give_the_
 
 
 def test_functions_are_arithmetic_alone() -> None:
-    f = function_of("2*sin(3*t) + cos(t)**2 - exp(-t)/max(t, 1) + abs(-pi) + sqrt(4) + step(t - 0.7)")
+    f = function_of(
+        "2*sin(3*t) + cos(t)**2 - exp(-t)/max(t, 1) + abs(-pi) + sqrt(4) + step(t - 0.7)"
+    )
     expected = 2 * math.sin(2.1) + math.cos(0.7) ** 2 - math.exp(-0.7) + math.pi + 3.0
     assert f(0.7) == pytest.approx(expected, rel=1e-15)
-    assert (function_of("sin(t)")(1e6), function_of("cos(t)")(1e6)) == sine_cosine(1e6)  # the same bits everywhere
+    assert (function_of("sin(t)")(1e6), function_of("cos(t)")(1e6)) == sine_cosine(
+        1e6
+    )  # the same bits everywhere
     with pytest.raises(IapbError, match=r"no value at t = 0\.5"):
         function_of("1/(t - 0.5)")(0.5)
 
@@ -86,7 +123,14 @@ def test_a_force_that_stops_being_a_number_ends_the_run_with_its_reason() -> Non
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_damping_is_backward_euler_for_any_damping(damping: float, integrator: str) -> None:
     """A rod on a hinge, without gravity: 0.1 kg m2 about it, turning at 2 rad/s."""
-    rod = {"name": "rod", "joint": "revolute", "mass": 1.0, "inertia": 0.1, "velocity": [2.0], "joint_damping": damping}
+    rod = {
+        "name": "rod",
+        "joint": "revolute",
+        "mass": 1.0,
+        "inertia": 0.1,
+        "velocity": [2.0],
+        "joint_damping": damping,
+    }
     run = simulate(scene_of([rod], [], duration=0.5), ImpulseAugmented(integrator=integrator))
     expected = 2.0 * (1.0 + 1e-3 * damping / 0.1) ** -np.arange(501.0)
     assert run.v[:, 0] == pytest.approx(expected, rel=1e-9, abs=1e-300)
@@ -140,14 +184,27 @@ def beyond(run: Run) -> float:
     return float(np.maximum(low - run.q, run.q - high).max())
 
 
-@pytest.mark.parametrize("law", [ImpulseAugmented(), ImpulseAugmented(pushing=True),
-                                 ImpulseAugmented(friction_in_impacts=True), Penalty()])
+@pytest.mark.parametrize(
+    "law",
+    [
+        ImpulseAugmented(),
+        ImpulseAugmented(pushing=True),
+        ImpulseAugmented(friction_in_impacts=True),
+        Penalty(),
+    ],
+)
 def test_limits_hold_in_space_for_turning_and_sliding_joints(law: Any) -> None:
     run = simulate(CRANE, law)
     assert 0.0 < beyond(run) < (0.02 if law.impulses else 0.05)  # springs alone stop late
-    assert not run.distrust and not run.contacts.friction_force.any()  # a stop has none, whatever contact.friction says
+    assert (
+        not run.distrust and not run.contacts.friction_force.any()
+    )  # a stop has none, whatever contact.friction says
     assert (np.diff(run.energy["impact_loss"]) >= 0.0).all()
     alone = simulate(CRANE.with_values({"contact.self_collision_rows": "per_body"}), law)
     assert np.array_equal(run.q, alone.q)  # rows of one body alone are not used at stops
-    free = simulate(CRANE.with_values({f"bodies.{name}.joint_limits": None for name in ("mast", "boom", "slider")}))
+    free = simulate(
+        CRANE.with_values(
+            {f"bodies.{name}.joint_limits": None for name in ("mast", "boom", "slider")}
+        )
+    )
     assert beyond(free) > 0.5

@@ -1,4 +1,5 @@
-"""The loop: compiled or stepped from Python it is one algorithm, and no run depends on what ran before."""
+"""The loop: compiled or stepped from Python it is one algorithm, and no run depends on what ran
+before."""
 
 from __future__ import annotations
 
@@ -25,13 +26,22 @@ from iapb.system import coupling_of, system_of
 from tests.iapb.test_recording import assert_same, results_of
 from tests.iapb.test_simulation_stops import Wrapped
 
-# A tilted, rough peg and a weak device: contacts one by one, friction, and impulses that exceed the limits.
-PEG = load_scene(find_scene("peg_corner")).with_values({
-    "bodies.peg.position": [0.0209, -0.0141, 0.08], "contact.friction": 0.1, "device.force_limit": [3, 3, 0.05],
-    "device.delay": 2, "device.position_resolution": [1e-5, 1e-5, 0], "device.damping": [0.5, 0.5, 0],
-})
+# A tilted, rough peg and a weak device: contacts one by one, friction, and impulses that exceed the
+# limits.
+PEG = load_scene(find_scene("peg_corner")).with_values(
+    {
+        "bodies.peg.position": [0.0209, -0.0141, 0.08],
+        "contact.friction": 0.1,
+        "device.force_limit": [3, 3, 0.05],
+        "device.delay": 2,
+        "device.position_resolution": [1e-5, 1e-5, 0],
+        "device.damping": [0.5, 0.5, 0],
+    }
+)
 CRADLE = load_scene(find_scene("newton_cradle"))
-ARM = load_scene(find_scene("arm_pushing"))  # inertia that varies, velocity terms, a group of two trees
+ARM = load_scene(
+    find_scene("arm_pushing")
+)  # inertia that varies, velocity terms, a group of two trees
 STEPS = 350  # past the fourth collision of the peg
 COUPLINGS = ("none", "four-channel", "unilateral")
 LAWS = [Penalty(), *(ImpulseAugmented(rendering=rendering) for rendering in RENDERINGS)]
@@ -43,10 +53,15 @@ def name_of(law):
     return "-".join([law.name.split(" ")[0], *map(str, law.settings.values())])
 
 
-@pytest.mark.parametrize(("scene", "coupling"), [*itertools.product((PEG, ARM), COUPLINGS), (CRADLE, "none")],
-                         ids=lambda value: getattr(value, "name", value))
+@pytest.mark.parametrize(
+    ("scene", "coupling"),
+    [*itertools.product((PEG, ARM), COUPLINGS), (CRADLE, "none")],
+    ids=lambda value: getattr(value, "name", value),
+)
 @pytest.mark.parametrize("law", LAWS, ids=name_of)
-def test_the_compiled_loop_records_what_each_step_from_python_does_bit_for_bit(scene, coupling, law):
+def test_the_compiled_loop_records_what_each_step_from_python_does_bit_for_bit(
+    scene, coupling, law
+):
     chosen = coupling_of(scene, coupling)
     run, stepped = simulate(scene, law, chosen, steps=STEPS), Simulation(scene, law, chosen)
     state, port, impact = stepped.state, stepped.port, 0
@@ -54,14 +69,20 @@ def test_the_compiled_loop_records_what_each_step_from_python_does_bit_for_bit(s
         result = stepped.step()
         for names, line in ((("q", "v", "device_q", "device_v"), k + 1), (FORCES, k)):
             for name in names:
-                made = next(getattr(each, name) for each in (result, port, state) if hasattr(each, name))
+                made = next(
+                    getattr(each, name) for each in (result, port, state) if hasattr(each, name)
+                )
                 assert np.array_equal(getattr(run, name)[line], made), (k, name)
         assert result.state == run.state[k]
         rows = slice(run.contacts.offsets[k], run.contacts.offsets[k + 1])
         count, logged = state.contact_count[0], state.impacts.logged[0]
         assert rows.stop - rows.start == count
         for each in CONTACTS:
-            made = state.contact_impulse if each.name == "impulse" else getattr(state.contacts, each.name)
+            made = (
+                state.contact_impulse
+                if each.name == "impulse"
+                else getattr(state.contacts, each.name)
+            )
             assert np.array_equal(getattr(run.contacts, each.name)[rows], made[:count]), each.name
         assert np.all(run.impacts.step[impact : impact + logged] == k)
         for each in IMPACTS[1:]:
@@ -75,7 +96,10 @@ def test_the_compiled_loop_records_what_each_step_from_python_does_bit_for_bit(s
 @pytest.mark.parametrize("coupling", COUPLINGS)
 def test_a_law_written_in_python_is_run_and_recorded_as_the_compiled_one(coupling):
     chosen = coupling_of(PEG, coupling)
-    ours, theirs = simulate(PEG, Wrapped(), chosen, steps=STEPS), simulate(PEG, steps=STEPS, coupling=chosen)
+    ours, theirs = (
+        simulate(PEG, Wrapped(), chosen, steps=STEPS),
+        simulate(PEG, steps=STEPS, coupling=chosen),
+    )
     assert (ours.kernel, theirs.kernel) == ("python", "compiled")
     assert_same(ours, theirs)
 
@@ -99,7 +123,9 @@ def test_results_of_steps_stay_as_they_were():
 
 
 def test_the_hand_force_stays_until_the_next_one():
-    simulation = Simulation(PEG.with_values({"hand.force": [0, 0, 0], "bodies.peg.position": [1, -1, 0.0]}))
+    simulation = Simulation(
+        PEG.with_values({"hand.force": [0, 0, 0], "bodies.peg.position": [1, -1, 0.0]})
+    )
     rest = simulation.step().v
     pushed = simulation.step([2.0, -4.0, 0.01]).v
     again = simulation.step().v
@@ -111,26 +137,49 @@ def test_the_hand_force_stays_until_the_next_one():
     assert spatial == pytest.approx(again - dt * np.array([0, 0, 0.01]) / mass, rel=1e-12)
 
 
-@pytest.mark.parametrize("force", [
-    [1.0], [1.0, 2.0, float("nan")], np.zeros((3, 1)), [np.inf] * 6, "abc", ["1", "2", "3"], [True, False, True],
-    [1j, 0, 0], [10**400, 0, 0], {"x": 1.0}, (x for x in (1.0, 2.0, 3.0)), np.ma.masked_array(np.zeros(3)),
-    [[1], [2, 3]], np.zeros(3, "m8[s]")])
+@pytest.mark.parametrize(
+    "force",
+    [
+        [1.0],
+        [1.0, 2.0, float("nan")],
+        np.zeros((3, 1)),
+        [np.inf] * 6,
+        "abc",
+        ["1", "2", "3"],
+        [True, False, True],
+        [1j, 0, 0],
+        [10**400, 0, 0],
+        {"x": 1.0},
+        (x for x in (1.0, 2.0, 3.0)),
+        np.ma.masked_array(np.zeros(3)),
+        [[1], [2, 3]],
+        np.zeros(3, "m8[s]"),
+    ],
+)
 def test_a_wrong_hand_force_is_named(force):
-    with pytest.raises(ArgumentError, match="hand_force = .*expected 3 .plane. or 6 .space. finite numbers"):
+    with pytest.raises(
+        ArgumentError, match="hand_force = .*expected 3 .plane. or 6 .space. finite numbers"
+    ):
         Simulation(PEG).step(force)
     with pytest.raises(ArgumentError, match="hand_force"):
         Simulation(find_scene("two_discs")).step([0, 0, 0])
 
 
 WRONG = {  # argument of `simulate` -> values that are refused
-    "steps": [0, -3, 2.5, True], "every": [0, 1.5], "law": ["IAPB", Penalty],
+    "steps": [0, -3, 2.5, True],
+    "every": [0, 1.5],
+    "law": ["IAPB", Penalty],
     "max_memory": [float("nan"), "1GB", -1, True],
-    "coupling": ["four-channel"], "coupling stiffness": [FourChannel((1.0,), (1.0,))], "progress": [1],
+    "coupling": ["four-channel"],
+    "coupling stiffness": [FourChannel((1.0,), (1.0,))],
+    "progress": [1],
     "world": [["IAPB"], None],
 }
 
 
-@pytest.mark.parametrize(("argument", "value"), [(name, value) for name, values in WRONG.items() for value in values])
+@pytest.mark.parametrize(
+    ("argument", "value"), [(name, value) for name, values in WRONG.items() for value in values]
+)
 def test_wrong_arguments_are_named_with_value_and_expectation(argument, value):
     with pytest.raises(ArgumentError) as caught:
         simulate(PEG, **{argument.split()[0]: value})
@@ -142,9 +191,13 @@ def test_a_scene_has_a_name_and_a_world_selects_the_law_and_its_coupling():
     run = simulate("peg_corner", world="PB", steps=3)
     assert (run.world, run.law, run.coupling) == ("PB", "penalty", "four-channel")
     assert simulate(PEG, Penalty(), world="my own", steps=3).world == "my own"
-    assert_same(simulate(PEG, steps=STEPS), simulate(PEG, world="IAPB", steps=STEPS))  # its gains act, as in `iapb run`
+    assert_same(
+        simulate(PEG, steps=STEPS), simulate(PEG, world="IAPB", steps=STEPS)
+    )  # its gains act, as in `iapb run`
     assert simulate(PEG, world="PB", coupling=NoCoupling(), steps=3).coupling == "none"
-    assert simulate(load_scene(find_scene("two_discs")), world="IAPB-push", steps=3).coupling == "none"
+    assert (
+        simulate(load_scene(find_scene("two_discs")), world="IAPB-push", steps=3).coupling == "none"
+    )
     with pytest.raises(ArgumentError, match=r"world = 'nonsense': expected one of IAPB, PB"):
         simulate("peg_corner", world="nonsense")
     with pytest.raises(ArgumentError, match="peg_corner"):
@@ -167,10 +220,16 @@ def test_a_record_that_would_not_fit_is_refused_with_its_size_before_it_is_alloc
 
 def test_a_run_shows_itself_in_a_line_a_table_a_picture_and_as_a_dataset():
     run = simulate("peg_corner", steps=STEPS)
-    assert repr(run).startswith("<Run of peg_corner in") and len(repr(run)) < 200 and "\n" not in repr(run)
+    assert (
+        repr(run).startswith("<Run of peg_corner in")
+        and len(repr(run)) < 200
+        and "\n" not in repr(run)
+    )
     assert "<table>" in run._repr_html_() and "peg.theta" in run._repr_html_()
     data = run.to_xarray()
-    assert data.q.dims == ("time", "coordinate") and list(data.coordinate.values) == list(run.coordinate_names)
+    assert data.q.dims == ("time", "coordinate") and list(data.coordinate.values) == list(
+        run.coordinate_names
+    )
     assert data.q.attrs["units"] == "m, m, rad" and data.contact_gap.attrs["units"] == "m"
     assert np.array_equal(data.energy_kinetic.values, run.energy["kinetic"])
     assert data.sizes["contact"] == len(run.contacts.gap) > 0
@@ -178,16 +237,27 @@ def test_a_run_shows_itself_in_a_line_a_table_a_picture_and_as_a_dataset():
 
 
 CHANGES = [  # what scenes with equal bodies or walls might share
-    {}, {"contact.friction": 0.2, "contact.forces": "implicit"}, {"contact.restitution": 0.5},
-    {"walls.floor.restitution": 0.6}, {"bodies.peg.mass": 1.5}, {"bodies.peg.position": [0.021, -0.0135, 0.02]},
-    {"bodies.peg.joint_damping": [1.0, 1.0, 0.0]}, {"rate": 700.0}, {"hand.point": [0.005, 0.002]},
-    {"hand.force_function": ["0.1*sin(9*t)", "0", "0"]}, {"device.delay": 3},
+    {},
+    {"contact.friction": 0.2, "contact.forces": "implicit"},
+    {"contact.restitution": 0.5},
+    {"walls.floor.restitution": 0.6},
+    {"bodies.peg.mass": 1.5},
+    {"bodies.peg.position": [0.021, -0.0135, 0.02]},
+    {"bodies.peg.joint_damping": [1.0, 1.0, 0.0]},
+    {"rate": 700.0},
+    {"hand.point": [0.005, 0.002]},
+    {"hand.force_function": ["0.1*sin(9*t)", "0", "0"]},
+    {"device.delay": 3},
 ]
 
 
 def test_a_scene_gives_the_bits_of_one_that_is_read_anew_whatever_ran_between() -> None:
-    laws = [ImpulseAugmented(rendering="scale"), ImpulseAugmented(pushing=True), Penalty(),
-            ImpulseAugmented(integrator="momentum")]
+    laws = [
+        ImpulseAugmented(rendering="scale"),
+        ImpulseAugmented(pushing=True),
+        Penalty(),
+        ImpulseAugmented(integrator="momentum"),
+    ]
     scene = load_scene(find_scene("peg_corner"))
     coupling = coupling_of(scene, "four-channel")
     changed = [scene.with_values(values) for values in CHANGES]
@@ -196,7 +266,9 @@ def test_a_scene_gives_the_bits_of_one_that_is_read_anew_whatever_ran_between() 
         alone = simulate(scene_from_text(each.source_text), laws[0], coupling, steps=STEPS)
         assert_same(run, alone)
         assert run.effects == alone.effects and run.distrust == alone.distrust
-    assert len({b"".join(map(np.ndarray.tobytes, results_of(run).values())) for run in after}) == len(CHANGES)
+    assert len(
+        {b"".join(map(np.ndarray.tobytes, results_of(run).values())) for run in after}
+    ) == len(CHANGES)
     for law in (*laws, *laws[::-1]):
         fresh = simulate(load_scene(find_scene("peg_corner")), law, coupling, steps=STEPS)
         assert_same(simulate(scene, law, coupling, steps=STEPS), fresh)
@@ -211,10 +283,16 @@ def test_a_simulation_refuses_to_be_copied(copied) -> None:
 
 def test_what_follows_from_a_run_is_its_own_and_computed_when_it_is_asked_for() -> None:
     """All runs have the same sizes; one is asked in between, one only after the last was made."""
-    heavy = PEG.with_values({"gravity": [0.0, 9.81]})  # sinks into the floor, so this run is not to be trusted
+    heavy = PEG.with_values(
+        {"gravity": [0.0, 9.81]}
+    )  # sinks into the floor, so this run is not to be trusted
 
     def followed(run: Run) -> list[object]:
-        return [run.pose.tobytes(), {name: each.tobytes() for name, each in run.energy.items()}, run.distrust]
+        return [
+            run.pose.tobytes(),
+            {name: each.tobytes() for name, each in run.energy.items()},
+            run.distrust,
+        ]
 
     alone = [followed(simulate(scene, steps=STEPS)) for scene in (PEG, heavy)]
     assert all(ours != theirs for ours, theirs in zip(*alone, strict=True))
@@ -223,8 +301,11 @@ def test_what_follows_from_a_run_is_its_own_and_computed_when_it_is_asked_for() 
     assert early.pose.tobytes() == alone[0][0] and early.pose is early.pose
     last = simulate(heavy, steps=STEPS)
     assert [followed(early), followed(late), followed(last)] == [alone[0], *alone]
-    for each in (copy.deepcopy(last), pickle.loads(pickle.dumps(simulate(heavy, steps=STEPS))),
-                 replace(last, world="w")):
+    for each in (
+        copy.deepcopy(last),
+        pickle.loads(pickle.dumps(simulate(heavy, steps=STEPS))),
+        replace(last, world="w"),
+    ):
         assert_same(last, each)
         assert each.scene_source == heavy.source_text and each.distrust == distrust_of(last)
     with pytest.raises(AttributeError, match="no attribute 'poses'"):
@@ -232,7 +313,8 @@ def test_what_follows_from_a_run_is_its_own_and_computed_when_it_is_asked_for() 
 
 
 def test_simulations_share_nothing_that_changes() -> None:
-    """Of one scene, and of two that differ in a value: what one writes no other sees, and what both read stays."""
+    """Of one scene, and of two that differ in a value: what one writes no other sees, and what both
+    read stays."""
     alike, coupling = ARM.with_values({"contact.friction": 0.25}), coupling_of(ARM, "four-channel")
     moving, *others = (Simulation(system_of(each), coupling=coupling) for each in (ARM, ARM, alike))
     constant = {id(array) for each in (moving, *others) for array in each.port.mechanism.arrays()}
@@ -242,7 +324,10 @@ def test_simulations_share_nothing_that_changes() -> None:
 
     def seen() -> list[bytes]:
         read = [each.world.arrays() + each.system.mechanism.block.arrays() for each in others]
-        return [array.tobytes() for array in itertools.chain(*read, *(changing[each] for each in others))]
+        return [
+            array.tobytes()
+            for array in itertools.chain(*read, *(changing[each] for each in others))
+        ]
 
     before = seen()
     assert recording.Recorder(moving).chunk(moving.scene.steps) is None

@@ -1,4 +1,5 @@
-"""What stops a run early: Ctrl-C, motion without bounds, a law that returns no step. What was done stays readable."""
+"""What stops a run early: Ctrl-C, motion without bounds, a law that returns no step. What was done
+stays readable."""
 
 from __future__ import annotations
 
@@ -41,7 +42,9 @@ class Wrapped:
 def assert_readable(run: Run, steps: int) -> None:
     """A partial run: every array ends at the last step done, and all of it is numbers."""
     assert not run.complete and run.stopped and run.steps == steps
-    assert len(run.penalty_force) == len(run.state) == steps and run.contacts.offsets[-1] == len(run.contacts.gap)
+    assert len(run.penalty_force) == len(run.state) == steps and run.contacts.offsets[-1] == len(
+        run.contacts.gap
+    )
     assert np.all(run.impacts.step < steps)
     for name, values in results_of(run).items():
         assert np.all(np.isfinite(values)), name
@@ -83,10 +86,24 @@ def test_ctrl_c_after_the_last_step_leaves_a_complete_run():
     assert run.complete and run.stopped == ""
 
 
-# Between two walls each stroke multiplies the speed by K dt² / m = 2000: the doubles end after a hundred strokes.
-ABSURD = PEG.with_values({"contact.stiffness": 1e9, "contact.damping": 0, "contact.friction": 0, "walls": [
-    {"name": f"wall_{side}", "kind": "half_plane", "point": [0.05 * side, 0], "normal": [-side, 0]} for side in (1, -1)
-]})
+# Between two walls each stroke multiplies the speed by K dt² / m = 2000: the doubles end after a
+# hundred strokes.
+ABSURD = PEG.with_values(
+    {
+        "contact.stiffness": 1e9,
+        "contact.damping": 0,
+        "contact.friction": 0,
+        "walls": [
+            {
+                "name": f"wall_{side}",
+                "kind": "half_plane",
+                "point": [0.05 * side, 0],
+                "normal": [-side, 0],
+            }
+            for side in (1, -1)
+        ],
+    }
+)
 
 
 def test_motion_that_leaves_the_range_of_numbers_stops_the_run_and_says_why():
@@ -97,8 +114,12 @@ def test_motion_that_leaves_the_range_of_numbers_stops_the_run_and_says_why():
 
 
 def test_an_unstable_device_stops_the_run_before_its_numbers_run_out():
-    """Its own damping b makes it diverge, by b dt / m = 1e6 a step, while nothing couples it to the tool."""
-    loose, scene = FourChannel((0.0,) * 3, (0.0,) * 3), PEG.with_values({"device.damping": [1e9, 0, 0]})
+    """Its own damping b makes it diverge, by b dt / m = 1e6 a step, while nothing couples it to the
+    tool."""
+    loose, scene = (
+        FourChannel((0.0,) * 3, (0.0,) * 3),
+        PEG.with_values({"device.damping": [1e9, 0, 0]}),
+    )
     run = simulate(scene, ImpulseAugmented(), loose, steps=STEPS)
     assert "the device's motion" in run.stopped
     assert_readable(run, run.steps)

@@ -21,7 +21,9 @@ def test_the_device_is_the_hand_held_tree_alone(scene):
     device, q = system.device_mechanism(), system.make_state().q
     tool, coordinates = slice(*system.tool_dofs), slice(*system.tool_coordinates)
     assert device.nv == tool.stop - tool.start
-    assert device.mass_matrix(q[coordinates]) == pytest.approx(system.mechanism.mass_matrix(q)[tool, tool], abs=1e-15)
+    assert device.mass_matrix(q[coordinates]) == pytest.approx(
+        system.mechanism.mass_matrix(q)[tool, tool], abs=1e-15
+    )
     port = system.make_port(coupling_of(scene, "four-channel"))
     assert np.array_equal(port.device_q, q[coordinates])
 
@@ -34,7 +36,9 @@ def test_limits_are_those_of_the_tools_coordinates_alone():
 def test_couplings_come_from_the_scene_and_their_absence_is_said():
     assert coupling_of(PEG, "four-channel").settings["stiffness"] == [100.0, 100.0, 0.5]
     assert coupling_of(PEG, "none") == NoCoupling()
-    with pytest.raises(ArgumentError, match="coupling = 'spring': expected one of none, four-channel, unilateral"):
+    with pytest.raises(
+        ArgumentError, match="coupling = 'spring': expected one of none, four-channel, unilateral"
+    ):
         coupling_of(PEG, "spring")
     with pytest.raises(ArgumentError, match="two_discs gives no gains"):
         coupling_of(load_scene(find_scene("two_discs")), "unilateral")

@@ -15,9 +15,15 @@ from iapb.scene.model import scene_kind
 from reference.worlds import run_world
 from tests.ordinary.scenes import CASES, Case, Motion
 
-LAWS = {"IAPB": [*CASES], "PB": ["ball_rolls", "tower_5", "ratio_1e6", "arch", "peg_jams", "ladder_slips"],
-        "ideal-friction": ["bounce_50_percent", "ladder_stands"]}  # fmt: skip
-TOO_FAST = ("fast_box_and_plate", "fast_ball_and_plate")  # through a plate within a step: the run must say so
+LAWS = {
+    "IAPB": [*CASES],
+    "PB": ["ball_rolls", "tower_5", "ratio_1e6", "arch", "peg_jams", "ladder_slips"],
+    "ideal-friction": ["bounce_50_percent", "ladder_stands"],
+}
+TOO_FAST = (
+    "fast_box_and_plate",
+    "fast_ball_and_plate",
+)  # through a plate within a step: the run must say so
 MADE = 1e-4  # of the scene's energy: what the integration of a right run may make
 
 
@@ -25,20 +31,31 @@ def motion_of(run: Run) -> Motion:
     """Return the motion of a run."""
     pose, planar = run.pose, run.pose.shape[2] == 3
     place = np.pad(pose[..., :2], ((0, 0), (0, 0), (0, 1))) if planar else pose[..., :3]
-    turned = (Rotation.from_euler("z", pose[..., 2:].reshape(-1, 1)) if planar else
-              Rotation.from_quat(pose[..., 3:].reshape(-1, 4)))
+    turned = (
+        Rotation.from_euler("z", pose[..., 2:].reshape(-1, 1))
+        if planar
+        else Rotation.from_quat(pose[..., 3:].reshape(-1, 4))
+    )
     return Motion(run.time, place, turned.as_matrix().reshape(*pose.shape[:2], 3, 3))
 
 
 def made_by(run: Run, scene: Scene) -> float:
-    """Energy made, by that of the start, of lifting each body by its size, and of the hand's force over 0.1 m."""
+    """Energy made, by that of the start, of lifting each body by its size, and of the hand's force
+    over 0.1 m."""
     q, v = start_of(scene)
     whole = run.energy["kinetic"] + run.energy["potential"]
-    made = np.max(whole[1:] - whole[0] - run.energy["hand_work"] - run.energy["coupling_work"], initial=0.0)
+    made = np.max(
+        whole[1:] - whole[0] - run.energy["hand_work"] - run.energy["coupling_work"], initial=0.0
+    )
     moving = 0.5 * v @ mechanism_of(scene).mass_matrix(q) @ v
     weight = np.linalg.norm(scene.gravity or [0.0])
-    lifted = sum(weight * body.mass * max(map(size_of, body.shapes), default=0.1) for body in scene.bodies)
-    return float(made / (moving + lifted + 0.1 * (np.linalg.norm(scene.hand.force[:2]) if scene.hand else 0.0)))
+    lifted = sum(
+        weight * body.mass * max(map(size_of, body.shapes), default=0.1) for body in scene.bodies
+    )
+    return float(
+        made
+        / (moving + lifted + 0.1 * (np.linalg.norm(scene.hand.force[:2]) if scene.hand else 0.0))
+    )
 
 
 def size_of(shape: Any) -> float:
@@ -52,7 +69,9 @@ def run_of(case: Case, world: str) -> tuple[Scene, Run]:
     return scene, run_world(scene, world, partial=True)
 
 
-@pytest.mark.parametrize(("world", "name"), [(world, name) for world, names in LAWS.items() for name in names])
+@pytest.mark.parametrize(
+    ("world", "name"), [(world, name) for world, names in LAWS.items() for name in names]
+)
 def test_a_scene_is_right_or_its_run_says_that_it_is_not(world: str, name: str) -> None:
     scene, run = run_of(CASES[name], world)
     if name in TOO_FAST:

@@ -1,4 +1,5 @@
-"""Files of the FrictionalContactLibrary, as its own programs lay them out, for tests of the reader."""
+"""Files of the FrictionalContactLibrary, as its own programs lay them out, for tests of the
+reader."""
 
 from __future__ import annotations
 
@@ -14,9 +15,14 @@ COMPRESSED_ROWS = -2  # value of nz that marks this storage
 
 
 def local_file(
-    path: Path, delassus: ArrayLike, offset: ArrayLike, friction: ArrayLike, impulse: ArrayLike | None = None
+    path: Path,
+    delassus: ArrayLike,
+    offset: ArrayLike,
+    friction: ArrayLike,
+    impulse: ArrayLike | None = None,
 ) -> None:
-    """Write u = W r + q for contacts in space: W (3k, 3k), q (3k,), mu (k,) and perhaps a solution r (3k,)."""
+    """Write u = W r + q for contacts in space: W (3k, 3k), q (3k,), mu (k,) and perhaps a solution
+    r (3k,)."""
     with h5py.File(path, "w") as file:
         group = file.create_group("fclib_local")
         matrix_group(group.create_group("W"), delassus)
@@ -31,7 +37,12 @@ def local_file(
 def matrix_group(group: Any, matrix: ArrayLike) -> None:
     """Write a matrix as compressed rows."""
     rows = sparse.csr_matrix(np.array(matrix, float))
-    for name, number in (("m", rows.shape[0]), ("n", rows.shape[1]), ("nz", COMPRESSED_ROWS), ("nzmax", rows.nnz)):
+    for name, number in (
+        ("m", rows.shape[0]),
+        ("n", rows.shape[1]),
+        ("nz", COMPRESSED_ROWS),
+        ("nzmax", rows.nnz),
+    ):
         group[name] = np.array([number], np.int32)
     group["i"] = rows.indices.astype(np.int32)
     group["p"] = rows.indptr.astype(np.int32)

@@ -50,24 +50,39 @@ def test_every_file_is_read() -> None:
     for path in files:
         stored = read_problem(path)
         assert stored.problem.name == path.name
-        assert path.name != "Box_Stacks-i0122-82-5.hdf5" or stored.stored_impulse is None  # only a placeholder
+        assert (
+            path.name != "Box_Stacks-i0122-82-5.hdf5" or stored.stored_impulse is None
+        )  # only a placeholder
 
 
 def test_a_local_problem_is_read_as_its_file_says(tmp_path: Path) -> None:
-    """W by compressed rows, q, one mu per contact, and the stored solution; one of zeros is a placeholder."""
+    """W by compressed rows, q, one mu per contact, and the stored solution; one of zeros is a
+    placeholder."""
     rows = np.random.default_rng(0).normal(size=(6, 4))
     delassus, offset, impulse = rows @ rows.T, np.arange(6.0), np.linspace(0.1, 0.6, 6)
-    for name, stored in (("solved.hdf5", impulse), ("placeholder.hdf5", np.zeros(6)), ("without.h5", None)):
+    for name, stored in (
+        ("solved.hdf5", impulse),
+        ("placeholder.hdf5", np.zeros(6)),
+        ("without.h5", None),
+    ):
         local_file(tmp_path / name, delassus, offset, [0.3, 0.5], stored)
         read = read_problem(tmp_path / name)
         assert (read.problem.contacts, read.problem.contact_size) == (2, 3)
         assert np.array_equal(read.problem.delassus, delassus)
-        assert np.array_equal(read.problem.gamma_minus, offset) and np.array_equal(read.problem.offset, offset)
+        assert np.array_equal(read.problem.gamma_minus, offset) and np.array_equal(
+            read.problem.offset, offset
+        )
         assert np.array_equal(read.problem.friction, [0.3, 0.5])
-        assert np.array_equal(read.stored_impulse, impulse) if stored is impulse else read.stored_impulse is None
+        assert (
+            np.array_equal(read.stored_impulse, impulse)
+            if stored is impulse
+            else read.stored_impulse is None
+        )
 
 
-@pytest.mark.parametrize(("name", "content", "says"), [
+@pytest.mark.parametrize(
+    ("name", "content", "says"),
+    [
         ("cut.lcp", b"2 1 0 0 1 -1", "with 5 numbers, expected"),
         ("words.lcp", b"2 1 0 zero 1 -1 -1", "could not convert"),
         ("nan.lcp", b"1 nan -1", "finite numbers"),
@@ -82,8 +97,11 @@ def test_a_local_problem_is_read_as_its_file_says(tmp_path: Path) -> None:
         ("foreign.hdf5", b"not hdf5 at all", "cannot be read"),
         ("picture.png", b"", "unknown kind"),
         ("mixed.txt", b"", "unknown kind"),
-])  # fmt: skip
-def test_damaged_and_foreign_files_are_named(tmp_path: Path, name: str, content: bytes, says: str) -> None:
+    ],
+)
+def test_damaged_and_foreign_files_are_named(
+    tmp_path: Path, name: str, content: bytes, says: str
+) -> None:
     path = tmp_path / name
     path.write_bytes(content)
     with pytest.raises(DatasetError, match=f"{name}.*{says}"):
@@ -100,34 +118,63 @@ def test_missing_files_and_folders(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("coordinates", [60, 12_000])
-def test_a_global_problem_is_condensed_whatever_its_number_of_coordinates(tmp_path: Path, coordinates: int) -> None:
-    """A dense M of 12,000 coordinates would take 1.2 GB; its 12,000 entries give the same W, entry by entry."""
+def test_a_global_problem_is_condensed_whatever_its_number_of_coordinates(
+    tmp_path: Path, coordinates: int
+) -> None:
+    """A dense M of 12,000 coordinates would take 1.2 GB; its 12,000 entries give the same W, entry
+    by entry."""
     rng, contacts = np.random.default_rng(0), 8
-    mass, f, mu = rng.uniform(0.5, 2.0, coordinates), rng.normal(size=coordinates), np.full(contacts, 0.3)
+    mass, f, mu = (
+        rng.uniform(0.5, 2.0, coordinates),
+        rng.normal(size=coordinates),
+        np.full(contacts, 0.3),
+    )
     h = sparse.random(coordinates, 3 * contacts, 0.05, random_state=1, format="csc")
     with h5py.File(tmp_path / "large.hdf5", "w") as file:
         group = file.create_group("fclib_global")
         for name, matrix in (("M", sparse.diags(mass).tocsc()), ("H", h)):
-            for key, value in (("m", matrix.shape[0]), ("n", matrix.shape[1]), ("nz", -1), ("nzmax", matrix.nnz)):
+            for key, value in (
+                ("m", matrix.shape[0]),
+                ("n", matrix.shape[1]),
+                ("nz", -1),
+                ("nzmax", matrix.nnz),
+            ):
                 group[f"{name}/{key}"] = np.array([value], np.int32)
-            group[f"{name}/i"], group[f"{name}/p"], group[f"{name}/x"] = matrix.indices, matrix.indptr, matrix.data
+            group[f"{name}/i"], group[f"{name}/p"], group[f"{name}/x"] = (
+                matrix.indices,
+                matrix.indptr,
+                matrix.data,
+            )
         group["vectors/f"], group["vectors/w"], group["vectors/mu"] = f, np.zeros(3 * contacts), mu
         group["spacedim"] = np.array([3], np.int32)
     problem, dense = read_problem(tmp_path / "large.hdf5").problem, h.toarray()
     assert (problem.mass_matrix is None) == (coordinates > WITH_MECHANICS)
-    assert problem.delassus == pytest.approx(dense.T @ (dense / mass[:, None]), rel=1e-12, abs=1e-14)
+    assert problem.delassus == pytest.approx(
+        dense.T @ (dense / mass[:, None]), rel=1e-12, abs=1e-14
+    )
     assert problem.gamma_minus == pytest.approx(dense.T @ (f / mass), rel=1e-12, abs=1e-14)
 
 
-@pytest.mark.parametrize(("name", "value", "says"), [
-    ("fclib_local/W/p", np.array([0, *[10**9] * 5, 0], np.int32), "pointers p decrease"),
-    ("fclib_local/W/i", np.array([99, 0], np.int32), "indices"), ("fclib_local/vectors/mu", None, "cannot be read"),
-    ("fclib_local/W/nz", np.array([77]), "nz = 77"), ("fclib_local/spacedim", np.array([5]), "2 or 3"),
-    ("fclib_local/W/m", np.array([10**6]), "at most"), ("fclib_local/vectors/q", np.array([np.nan]), "finite numbers"),
-    ("fclib_local/vectors/q", np.bytes_("q"), "numbers"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "value", "says"),
+    [
+        ("fclib_local/W/p", np.array([0, *[10**9] * 5, 0], np.int32), "pointers p decrease"),
+        ("fclib_local/W/i", np.array([99, 0], np.int32), "indices"),
+        ("fclib_local/vectors/mu", None, "cannot be read"),
+        ("fclib_local/W/nz", np.array([77]), "nz = 77"),
+        ("fclib_local/spacedim", np.array([5]), "2 or 3"),
+        ("fclib_local/W/m", np.array([10**6]), "at most"),
+        ("fclib_local/vectors/q", np.array([np.nan]), "finite numbers"),
+        ("fclib_local/vectors/q", np.bytes_("q"), "numbers"),
+    ],
+)
 def test_a_damaged_fclib_file_is_named(tmp_path: Path, name: str, value: Any, says: str) -> None:
-    local_file(tmp_path / "w.hdf5", np.diag([1.0, 0.0, 0.0, 1.0, 0.0, 0.0]), [1.0, 0.0, 0.0, 1.0, 0.0, 0.0], [0.0, 0.0])
+    local_file(
+        tmp_path / "w.hdf5",
+        np.diag([1.0, 0.0, 0.0, 1.0, 0.0, 0.0]),
+        [1.0, 0.0, 0.0, 1.0, 0.0, 0.0],
+        [0.0, 0.0],
+    )
     with h5py.File(tmp_path / "w.hdf5", "r+") as file:
         del file[name]
         if value is not None:

@@ -1,4 +1,5 @@
-"""Event-driven truths by hand and by energy; time stepping, rigid worlds and the engine against them."""
+"""Event-driven truths by hand and by energy; time stepping, rigid worlds and the engine against
+them."""
 
 from __future__ import annotations
 
@@ -27,7 +28,9 @@ def ball(e: float, mass: float = 1.0) -> LinearSystem:
 def row_of_balls(masses: list[float], e: float) -> LinearSystem:
     """Balls on a line, coordinates left to right, radius absorbed."""
     n = len(masses)
-    return LinearSystem(np.diag(masses), np.zeros(n), np.diff(np.eye(n), axis=0), np.zeros(n - 1), e)
+    return LinearSystem(
+        np.diag(masses), np.zeros(n), np.diff(np.eye(n), axis=0), np.zeros(n - 1), e
+    )
 
 
 def test_ball_bounces_at_the_times_of_the_textbook() -> None:
@@ -49,17 +52,22 @@ def test_accumulating_impacts_are_reported_not_crossed() -> None:
 
 
 def test_plastic_block_slides_into_the_corner_and_rests() -> None:
-    """A block pushed right and down: floor, then wall, then still; each wall's impulse is the lost momentum."""
+    """A block pushed right and down: floor, then wall, then still; each wall's impulse is the lost
+    momentum."""
     rows, start = [[0.0, 1.0], [-1.0, 0.0]], [0.0, 1.0]
     system = LinearSystem(2.0 * np.eye(2), [1.0, -4.0], rows, start, 0.0)
     exact = event_driven(system, [0.0, 0.25], [0.0, 0.0], 5.0)
     assert exact.event_time == pytest.approx([0.0, 0.5, 2.0], rel=1e-14)
-    assert exact.impulse[1] == pytest.approx([2.0, 0.0]) and exact.impulse[2] == pytest.approx([0.0, 2.0])
+    assert exact.impulse[1] == pytest.approx([2.0, 0.0]) and exact.impulse[2] == pytest.approx(
+        [0.0, 2.0]
+    )
     q, v = exact.state([5.0])
     assert q[0] == pytest.approx([1.0, 0.0], abs=1e-14) and np.abs(v).max() <= 1e-14
 
 
-def test_a_resting_contact_opens_when_the_force_lifts_it_and_equal_elastic_balls_exchange_their_velocities() -> None:
+def test_a_resting_contact_opens_when_the_force_lifts_it_and_equal_elastic_balls_exchange_their_velocities() -> (
+    None
+):
     lifted = LinearSystem([[1.0]], [1.0], [[1.0]], [0.0], 0.0)
     assert event_driven(lifted, [0.0], [0.0], 2.0).state([2.0])[0][0, 0] == pytest.approx(2.0)
     exact = event_driven(row_of_balls([1.0, 1.0, 1.0], 1.0), [0.0, 1.0, 2.5], [1.0, 0.0, 0.0], 10.0)
@@ -72,18 +80,36 @@ def test_the_law_of_the_impacts_is_the_callers() -> None:
 
     system = row_of_balls([1.0, 1.0], 1.0)
     assert event_driven(system, [0.0, 1.0], [1.0, 0.0], 3.0).v[-1] == pytest.approx([0.0, 1.0])
-    assert event_driven(system, [0.0, 1.0], [1.0, 0.0], 3.0, law=plastic).v[-1] == pytest.approx([0.5, 0.5])
+    assert event_driven(system, [0.0, 1.0], [1.0, 0.0], 3.0, law=plastic).v[-1] == pytest.approx(
+        [0.5, 0.5]
+    )
 
 
-DROP = scene_of({"mass": 0.5, "inertia": [2e-4] * 3, "shapes": [{"kind": "sphere", "radius": 0.04}],
-                 "position": [0, 0, 0.24, 0, 0, 0, 1], "velocity": [0.3, 0, 0, 2, 3, 1]},
-                gravity=G, floor=0.0, contact={"restitution": 0.6})  # fmt: skip
-ARM = {"joint": "revolute", "axis": [0, 1, 0], "mass": 2, "inertia": [1e-3, 0.03, 0.03], "center_of_mass": [0.2, 0, 0],
-       "shapes": [{"kind": "sphere", "radius": 0.05, "center": [0.4, 0, 0]}]}  # fmt: skip
+DROP = scene_of(
+    {
+        "mass": 0.5,
+        "inertia": [2e-4] * 3,
+        "shapes": [{"kind": "sphere", "radius": 0.04}],
+        "position": [0, 0, 0.24, 0, 0, 0, 1],
+        "velocity": [0.3, 0, 0, 2, 3, 1],
+    },
+    gravity=G,
+    floor=0.0,
+    contact={"restitution": 0.6},
+)
+ARM = {
+    "joint": "revolute",
+    "axis": [0, 1, 0],
+    "mass": 2,
+    "inertia": [1e-3, 0.03, 0.03],
+    "center_of_mass": [0.2, 0, 0],
+    "shapes": [{"kind": "sphere", "radius": 0.05, "center": [0.4, 0, 0]}],
+}
 
 
 def test_a_dropped_ball_is_the_ball_of_the_exact_events() -> None:
-    """Two truths that share no code between events: arcs in closed form, and an integrator with root finding."""
+    """Two truths that share no code between events: arcs in closed form, and an integrator with
+    root finding."""
     exact = event_driven(LinearSystem([[0.5]], [-0.5 * G], [[1.0]], [0.0], 0.6), [0.2], [0.0], 0.5)
     truth = scene_truth(DROP, 0.5)
     time = np.linspace(0.0, 0.5, 51)
@@ -95,8 +121,11 @@ def test_a_dropped_ball_is_the_ball_of_the_exact_events() -> None:
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.4])
-def test_an_arm_strikes_its_one_contact_with_the_speed_that_its_energy_says(restitution: float) -> None:
-    """½ I ω² = m g l sin(angle) at sin(angle) = 0.2/0.4; then −e ω, or rest with the gap held closed."""
+def test_an_arm_strikes_its_one_contact_with_the_speed_that_its_energy_says(
+    restitution: float,
+) -> None:
+    """½ I ω² = m g l sin(angle) at sin(angle) = 0.2/0.4; then −e ω, or rest with the gap held
+    closed."""
     scene = scene_of(ARM, gravity=G, floor=-0.25, contact={"restitution": restitution})
     truth = scene_truth(scene, 0.3)
     inertia, angle = 0.03 + 2.0 * 0.2**2, np.arcsin(0.5)
@@ -111,34 +140,57 @@ def test_an_arm_strikes_its_one_contact_with_the_speed_that_its_energy_says(rest
 
 
 def bouncing(restitution: float) -> Scene:
-    ball = {"mass": 0.5, "inertia": 2e-4, "shapes": [{"kind": "circle", "radius": 0.04}], "position": [0, 0.09, 0],
-            "velocity": [0.3, 0, 0]}  # fmt: skip
+    ball = {
+        "mass": 0.5,
+        "inertia": 2e-4,
+        "shapes": [{"kind": "circle", "radius": 0.04}],
+        "position": [0, 0.09, 0],
+        "velocity": [0.3, 0, 0],
+    }
     return scene_of(ball, space=False, gravity=G, floor=0.0, contact={"restitution": restitution})
 
 
 def test_bounces_that_accumulate_end_in_a_lasting_contact() -> None:
-    """A ball from 5 cm, e = 0.5: it rests after 3 sqrt(2 h/g), infinitely many bounces later, and then slides on."""
+    """A ball from 5 cm, e = 0.5: it rests after 3 sqrt(2 h/g), infinitely many bounces later, and
+    then slides on."""
     truth = scene_truth(bouncing(0.5), 1.0)
     rests = 3.0 * np.sqrt(2.0 * 0.05 / G)
     falls = rests / 3.0 * (1.0 + 2.0 * (1.0 - 0.5 ** np.arange(len(truth.events))))
     assert truth.events == pytest.approx(falls, abs=2.0 * truth.bound.instant)
-    assert truth.events[-1] == pytest.approx(rests, abs=6e-4)  # 2 v/g/(1 - e) of bounces below 1e-7 m
+    assert truth.events[-1] == pytest.approx(
+        rests, abs=6e-4
+    )  # 2 v/g/(1 - e) of bounces below 1e-7 m
     q, v = truth.state(np.linspace(rests, 1.0, 9))
-    assert q[:, 1] == pytest.approx(0.04, abs=truth.bound.position) and q[-1, 0] == pytest.approx(0.3, abs=1e-9)
+    assert q[:, 1] == pytest.approx(0.04, abs=truth.bound.position) and q[-1, 0] == pytest.approx(
+        0.3, abs=1e-9
+    )
     assert np.abs(v[:, 1]).max() <= truth.bound.velocity
 
 
 def test_the_bound_holds_all_the_bounces_that_are_neglected() -> None:
     low = {"bodies.body_0.position": [0, 0.04, 0], "bodies.body_0.velocity": [0, -1e-3, 0]}
     height = (0.5e-3) ** 2 / (2.0 * G)  # of the first one
-    assert scene_truth(bouncing(0.5).with_values(low), 0.05).bound.position >= 2.0 * height / (1.0 - 0.25)
+    assert scene_truth(bouncing(0.5).with_values(low), 0.05).bound.position >= 2.0 * height / (
+        1.0 - 0.25
+    )
 
 
-@pytest.mark.parametrize(("given", "error", "says"), [
-    ((lambda: DROP.with_values({"hand": {"body": "body_0"}}), 0.1, True), ArgumentError, "a scene without quaternions"),
-    ((lambda: load_scene(find_scene("box_stack")), 0.1), SolverError, "box_stack: .* contacts overlap"),
-    ((lambda: bouncing(0.97), 6.0, False, 20), SolverError, "impacts accumulate, 20 before"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("given", "error", "says"),
+    [
+        (
+            (lambda: DROP.with_values({"hand": {"body": "body_0"}}), 0.1, True),
+            ArgumentError,
+            "a scene without quaternions",
+        ),
+        (
+            (lambda: load_scene(find_scene("box_stack")), 0.1),
+            SolverError,
+            "box_stack: .* contacts overlap",
+        ),
+        ((lambda: bouncing(0.97), 6.0, False, 20), SolverError, "impacts accumulate, 20 before"),
+    ],
+)
 def test_refusals(given: Any, error: type[Exception], says: str) -> None:
     make, *options = given
     with pytest.raises(error, match=says):
@@ -165,8 +217,13 @@ def limited_arm(**values: object) -> Scene:
 
 def test_a_device_like_its_tool_goes_with_it_where_velocities_make_forces() -> None:
     gains = {"four_channel": {"stiffness": [10, 10], "damping": [1, 1]}}
-    arm = limited_arm(gravity=[0, 0], device={}, hand={"body": "lower"}, couplings=gains, **{
-        "bodies.upper.joint_damping": 0, "bodies.lower.position": [-0.3]})
+    arm = limited_arm(
+        gravity=[0, 0],
+        device={},
+        hand={"body": "lower"},
+        couplings=gains,
+        **{"bodies.upper.joint_damping": 0, "bodies.lower.position": [-0.3]},
+    )
     tool_and_device = scene_truth(arm, 0.2, coupled=True).segments[0][2](0.1)
     assert tool_and_device[:4] == pytest.approx(tool_and_device[4:], abs=1e-8)
 
@@ -184,10 +241,19 @@ def test_damped_and_limited_joints_converge_to_the_event_driven_truth(world: str
 
 @pytest.mark.parametrize("damping", [1.0, 100.0, 900.0])
 def test_a_blow_comes_before_damping_and_gains_nothing(damping: float) -> None:
-    """m = 1 kg, e = 1: v⁺ = −v⁻ of the step's start, and damping divides it by 1 + dt D in the same step."""
-    slider = {"joint": "prismatic", "axis": [1, 0], "inertia": 0.01, "joint_damping": damping,
-              "joint_limits": [-9, 0.1], "velocity": [1000]}  # fmt: skip
-    run = run_world(scene_of(slider, space=False, duration=0.005, contact={"restitution": 1}), "ideal")
+    """m = 1 kg, e = 1: v⁺ = −v⁻ of the step's start, and damping divides it by 1 + dt D in the same
+    step."""
+    slider = {
+        "joint": "prismatic",
+        "axis": [1, 0],
+        "inertia": 0.01,
+        "joint_damping": damping,
+        "joint_limits": [-9, 0.1],
+        "velocity": [1000],
+    }
+    run = run_world(
+        scene_of(slider, space=False, duration=0.005, contact={"restitution": 1}), "ideal"
+    )
     (step,), impacts = run.impacts.step, run.impacts
     came = 1000.0 / (1.0 + 1e-3 * damping) ** step
     assert impacts.v_minus[0] == run.v[step] == pytest.approx([came], rel=1e-12)
@@ -200,10 +266,13 @@ def test_a_blow_comes_before_damping_and_gains_nothing(damping: float) -> None:
 def test_every_world_takes_the_hands_force_over_time() -> None:
     table = [[0.0, 0.0, 0.0, 0.0], [0.2, 0.2, 0.1, 0.0]]
     scene = load_scene(find_scene("peg_corner")).with_values(
-        {"duration": 0.2, "hand.force": [0, 0, 0], "hand.force_table": table})
+        {"duration": 0.2, "hand.force": [0, 0, 0], "hand.force_table": table}
+    )
     engine, rigid = simulate(scene), run_world(scene, "ideal")
     assert np.array_equal(simulate(scene, world="IAPB").hand_force, rigid.hand_force)
-    assert rigid.hand_force[-1, 0] == pytest.approx(0.2 * (len(rigid.time) - 1.5) * scene.step / 0.2)
+    assert rigid.hand_force[-1, 0] == pytest.approx(
+        0.2 * (len(rigid.time) - 1.5) * scene.step / 0.2
+    )
     assert engine.hand_force[-1, 0] == rigid.hand_force[-1, 0]
     with pytest.raises(ArgumentError, match="does not change over time"):
         scene_truth(scene, 0.2)

@@ -26,9 +26,13 @@ def test_one_mass_against_a_wall() -> None:
 
 @pytest.mark.parametrize("seed", range(8))
 def test_exact_outcome_obeys_the_theorem_without_any_tolerance(seed: int) -> None:
-    """J v⁺ = −e J v⁻ on every row, redundant ones included, and elastic energy is conserved, exactly."""
+    """J v⁺ = −e J v⁻ on every row, redundant ones included, and elastic energy is conserved,
+    exactly."""
     rng = np.random.default_rng(seed)
-    root, rows = rng.integers(-4, 5, (4, 4)).astype(float), rng.integers(-3, 4, (6, 4)).astype(float)
+    root, rows = (
+        rng.integers(-4, 5, (4, 4)).astype(float),
+        rng.integers(-3, 4, (6, 4)).astype(float),
+    )
     rows[3:], v = 2.0 * rows[:3], rng.normal(size=4)
     impact = exact_impact(root @ root.T + np.eye(4), rows, v, 1)
     assert impact.energy_after == impact.energy_before
@@ -52,14 +56,19 @@ def test_near_redundancy_is_independence() -> None:
 
 def test_condition_numbers() -> None:
     assert exact.condition_number(np.diag([1.0, 1e-12, 3.0])) == pytest.approx(3e12, rel=1e-14)
-    assert exact.row_condition_number(np.eye(3), [[1.0, 0, 0], [0, 4.0, 0], [0, 4.0, 0]]) == pytest.approx(32**0.5)
+    assert exact.row_condition_number(
+        np.eye(3), [[1.0, 0, 0], [0, 4.0, 0], [0, 4.0, 0]]
+    ) == pytest.approx(32**0.5)
     assert exact.row_condition_number(np.eye(2), np.zeros((0, 2))) == 1.0
 
 
 @pytest.mark.parametrize("symmetric", [True, False])
 @pytest.mark.parametrize("kappa", [1.0, 1e6, 1e12])
-def test_double_double_gain_is_within_its_bound_of_the_rational_one(kappa: float, symmetric: bool) -> None:
-    """Also where M is asymmetric in the last bits, as Q D Qᵀ is; mostly along the light direction, which cancels."""
+def test_double_double_gain_is_within_its_bound_of_the_rational_one(
+    kappa: float, symmetric: bool
+) -> None:
+    """Also where M is asymmetric in the last bits, as Q D Qᵀ is; mostly along the light direction,
+    which cancels."""
     rng = np.random.default_rng(int(np.log10(kappa)))
     for _ in range(10):
         d = int(rng.integers(1, 9))
@@ -73,21 +82,30 @@ def test_double_double_gain_is_within_its_bound_of_the_rational_one(kappa: float
         assert abs(gain - truth) <= bound <= 1e-15 * abs(truth) + 1e-14 * kappa * 1e-12
 
 
-@pytest.mark.parametrize(("arguments", "gain"), [
-    (([[1.0]], [1e-10], [1e300]), np.inf), ((np.eye(2), [1.0, 0.0], [1.0, 1e-200]), 5e-324),
-    ((np.eye(2), [1.0, 1e-200], [1.0, 0.0]), 0.0), (([[1.0]], [0.0], [0.0]), 0.0), (([[1.0]], [0.0], [1.0]), np.inf),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("arguments", "gain"),
+    [
+        (([[1.0]], [1e-10], [1e300]), np.inf),
+        ((np.eye(2), [1.0, 0.0], [1.0, 1e-200]), 5e-324),
+        ((np.eye(2), [1.0, 1e-200], [1.0, 0.0]), 0.0),
+        (([[1.0]], [0.0], [0.0]), 0.0),
+        (([[1.0]], [0.0], [1.0]), np.inf),
+    ],
+)
 def test_a_gain_beyond_the_range_of_doubles_is_a_gain(arguments: Any, gain: float) -> None:
     assert relative_energy_gain(*arguments) == gain
 
 
-@pytest.mark.parametrize(("call", "arguments", "says"), [
-    (exact_impact, ([[1.0]], [[np.nan]], [1.0], 1.0), "finite"),
-    (exact_impact, ([[1.0]], [[1.0, 2.0]], [1.0], 1.0), "columns"),
-    (bulk_energy_gain, ([[1.0]], [1e200], [1.0]), "magnitudes"),
-    (bulk_energy_gain, ([[1.0]], [1.0], [[1.0], [1.0]]), "as v_minus"),
-    (bulk_energy_gain, (np.eye(2), [1.0], [1.0]), "mass_matrix"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("call", "arguments", "says"),
+    [
+        (exact_impact, ([[1.0]], [[np.nan]], [1.0], 1.0), "finite"),
+        (exact_impact, ([[1.0]], [[1.0, 2.0]], [1.0], 1.0), "columns"),
+        (bulk_energy_gain, ([[1.0]], [1e200], [1.0]), "magnitudes"),
+        (bulk_energy_gain, ([[1.0]], [1.0], [[1.0], [1.0]]), "as v_minus"),
+        (bulk_energy_gain, (np.eye(2), [1.0], [1.0]), "mass_matrix"),
+    ],
+)
 def test_refusals(call: Any, arguments: Any, says: str) -> None:
     with pytest.raises(ArgumentError, match=says):
         call(*arguments)

@@ -1,4 +1,5 @@
-"""The reference's mechanics: free motion against closed forms and beside the engine's, by Pinocchio.
+"""The reference's mechanics: free motion against closed forms and beside the engine's, by
+Pinocchio.
 
 The truth of events has no friction, so only the world "ideal-friction" is asked to roll.
 """
@@ -54,27 +55,40 @@ def axes_of(quaternions: Floats) -> Floats:
     return np.asarray(Rotation.from_quat(quaternions).as_matrix())
 
 
-# --- torque-free motion ------------------------------------------------------------------------------------------
+# --- torque-free motion
+# ------------------------------------------------------------------------------------------
 I1, I2, I3 = MOMENTS = np.array([1e-3, 2e-3, 2.8e-3])
 
 
 @both
 @pytest.mark.parametrize(("spin", "duration"), [(10.0, 2.0), (100.0, 0.5), (1000.0, 0.02)])
-def test_an_asymmetric_top_turns_as_elliptic_functions_say(moved: Moved, spin: float, duration: float) -> None:
-    """Landau and Lifshitz, Mechanics, section 37: body rates by cn, sn, dn; turning about the momentum by a quadrature.
+def test_an_asymmetric_top_turns_as_elliptic_functions_say(
+    moved: Moved, spin: float, duration: float
+) -> None:
+    """Landau and Lifshitz, Mechanics, section 37: body rates by cn, sn, dn; turning about the
+    momentum by a quadrature.
 
-    The truth's integrator errs by 1e-11 a step, the steps by rounding; an explicit bias errs by 1e-4 to 1 in a step.
+    The truth's integrator errs by 1e-11 a step, the steps by rounding; an explicit bias errs by
+    1e-4 to 1 in a step.
     """
     start = spin * np.array([0.3, 0.0, 0.95])
-    time, q, v = moved(scene_of({"inertia": MOMENTS.tolist(), "velocity": [0, 0, 0, *start]}), duration)
+    time, q, v = moved(
+        scene_of({"inertia": MOMENTS.tolist(), "velocity": [0, 0, 0, *start]}), duration
+    )
     M, E2 = np.linalg.norm(MOMENTS * start), MOMENTS @ start**2
     above, below = E2 * I3 - M**2, M**2 - E2 * I1
-    rate, modulus = np.sqrt((I3 - I2) * below / (I1 * I2 * I3)), (I2 - I1) * above / ((I3 - I2) * below)
+    rate, modulus = (
+        np.sqrt((I3 - I2) * below / (I1 * I2 * I3)),
+        (I2 - I1) * above / ((I3 - I2) * below),
+    )
 
     def rates(t: Any) -> Any:
         sn, cn, dn, _ = ellipj(rate * t, modulus)
-        return (np.sqrt(above / (I1 * (I3 - I1))) * cn, np.sqrt(above / (I2 * (I3 - I2))) * sn,
-                np.sqrt(below / (I3 * (I3 - I1))) * dn)  # fmt: skip
+        return (
+            np.sqrt(above / (I1 * (I3 - I1))) * cn,
+            np.sqrt(above / (I2 * (I3 - I2))) * sn,
+            np.sqrt(below / (I3 * (I3 - I1))) * dn,
+        )
 
     def precession(t: float) -> float:
         w1, w2, _ = rates(t)
@@ -83,8 +97,11 @@ def test_an_asymmetric_top_turns_as_elliptic_functions_say(moved: Moved, spin: f
     assert v[:, 3:] == pytest.approx(np.transpose(rates(time)), abs=1e-9 * spin)
     axes, momentum = axes_of(q[:, 3:]), MOMENTS * start / M
     assert axes @ (MOMENTS * v[:, 3:])[:, :, None] / M == pytest.approx(
-        np.broadcast_to(momentum[:, None], (len(time), 3, 1)), abs=1e-9)
-    third = axes[[0, -1], :, 2] - np.outer(axes[[0, -1], :, 2] @ momentum, momentum)  # its part across the momentum
+        np.broadcast_to(momentum[:, None], (len(time), 3, 1)), abs=1e-9
+    )
+    third = axes[[0, -1], :, 2] - np.outer(
+        axes[[0, -1], :, 2] @ momentum, momentum
+    )  # its part across the momentum
     turned = np.arctan2(np.cross(third[0], third[1]) @ momentum, third[0] @ third[1])
     expected = quad(precession, 0.0, float(time[-1]), epsabs=1e-12, limit=1000)[0]
     assert np.angle(np.exp(1j * (turned - expected))) == pytest.approx(0.0, abs=1e-7)
@@ -93,12 +110,15 @@ def test_an_asymmetric_top_turns_as_elliptic_functions_say(moved: Moved, spin: f
 @both
 @pytest.mark.parametrize("spin", [1.0, 1000.0])
 def test_a_spinning_sphere_flies_straight(moved: Moved, spin: float) -> None:
-    """The first reference accelerated it from 3 to 434 m/s in a second at 100 rad/s: ω × v was explicit."""
+    """The first reference accelerated it from 3 to 434 m/s in a second at 100 rad/s: ω × v was
+    explicit."""
     ball = {"inertia": [4e-4] * 3, "velocity": [3, 0, 0, 0, 0.6 * spin, 0.8 * spin]}
     time, q, v = moved(scene_of(ball), 0.1)
     assert q[:, :3] == pytest.approx(np.outer(time, [3.0, 0.0, 0.0]), abs=1e-9)
     velocity = axes_of(q[:, 3:]) @ v[:, :3, None]
-    assert velocity[:, :, 0] == pytest.approx(np.broadcast_to([3.0, 0.0, 0.0], (len(time), 3)), abs=1e-8)
+    assert velocity[:, :, 0] == pytest.approx(
+        np.broadcast_to([3.0, 0.0, 0.0], (len(time), 3)), abs=1e-8
+    )
     assert np.linalg.norm(v[:, 3:], axis=1) == pytest.approx(spin, rel=1e-9)
 
 
@@ -107,33 +127,55 @@ def test_floating_trees_that_turn_keep_momentum_and_energy() -> None:
     for seed in range(3):
         rng = np.random.default_rng(seed)
         tree = random_mechanism(rng, 3, ("revolute", "spherical")).bodies
-        base = Body("base", None, Joint("free_flyer"), mass=20.0, inertia=np.diag([20.0, 30.0, 40.0]))
-        mechanics = model_of(Mechanism([base, *(replace(body, parent=body.parent or "base") for body in tree)]))
+        base = Body(
+            "base", None, Joint("free_flyer"), mass=20.0, inertia=np.diag([20.0, 30.0, 40.0])
+        )
+        mechanics = model_of(
+            Mechanism([base, *(replace(body, parent=body.parent or "base") for body in tree)])
+        )
         q = mechanics.normalize(np.ones(mechanics.nq))
         v = rng.uniform(-30.0, 30.0, mechanics.nv)
         energy, momentum = mechanics.kinetic_energy(q, v), mechanics.centroidal_momentum(q, v)
         for _ in range(300):
             q, v = free_motion(mechanics, q, v, 1e-3)
         assert mechanics.kinetic_energy(q, v) == pytest.approx(energy, rel=1e-10)
-        assert mechanics.centroidal_momentum(q, v) == pytest.approx(momentum, abs=1e-10 * np.abs(momentum).max())
+        assert mechanics.centroidal_momentum(q, v) == pytest.approx(
+            momentum, abs=1e-10 * np.abs(momentum).max()
+        )
 
 
-# --- with gravity and contact -------------------------------------------------------------------------------------
-A, C, ARM, TILT, PRECESSION = 2e-3, 1e-3, 0.05, 0.4, 3.0  # kg m² about the centre of mass, m, rad, rad/s
+# --- with gravity and contact
+# -------------------------------------------------------------------------------------
+A, C, ARM, TILT, PRECESSION = (
+    2e-3,
+    1e-3,
+    0.05,
+    0.4,
+    3.0,
+)  # kg m² about the centre of mass, m, rad, rad/s
 
 
 @both
 def test_a_heavy_symmetric_top_precesses_steadily(moved: Moved) -> None:
     """A' Ω² cos θ − C ω₃ Ω + m g l = 0 about the pivot, A' = A + m l²; L_z and L₃ are constant.
 
-    By steps, gravity acts at once at the start of a step. Then the axis nutates by about the share of this momentum in
-    that of the spin, and the energy by its square; L_z and L₃ are still exact.
+    By steps, gravity acts at once at the start of a step. Then the axis nutates by about the share
+    of this momentum in that of the spin, and the energy by its square; L_z and L₃ are still exact.
     """
     pivot = A + ARM**2
     spin = (pivot * PRECESSION**2 * np.cos(TILT) + G * ARM) / (C * PRECESSION)
-    turning = [0.0, PRECESSION * np.sin(TILT), spin]  # axes turned about x: the vertical is (0, sin θ, cos θ)
-    top = {"joint": "spherical", "inertia": [A, A, C], "center_of_mass": [0, 0, ARM], "velocity": turning,
-           "position": [np.sin(TILT / 2), 0.0, 0.0, np.cos(TILT / 2)]}  # fmt: skip
+    turning = [
+        0.0,
+        PRECESSION * np.sin(TILT),
+        spin,
+    ]  # axes turned about x: the vertical is (0, sin θ, cos θ)
+    top = {
+        "joint": "spherical",
+        "inertia": [A, A, C],
+        "center_of_mass": [0, 0, ARM],
+        "velocity": turning,
+        "position": [np.sin(TILT / 2), 0.0, 0.0, np.cos(TILT / 2)],
+    }
     time, q, v = moved(scene_of(top, gravity=G), 1.0)
     axes = axes_of(q)
     upward = np.einsum("nij,nj->ni", axes, np.array([pivot, pivot, C]) * v)[:, 2]
@@ -147,60 +189,94 @@ def test_a_heavy_symmetric_top_precesses_steadily(moved: Moved) -> None:
 
 
 RADIUS = 0.0285
-BALL: dict[str, Any] = {"mass": 0.17, "inertia": [0.4 * 0.17 * RADIUS**2] * 3, "position": [0, 0, RADIUS, *UPRIGHT],
-                        "shapes": [{"kind": "sphere", "radius": RADIUS}]}  # fmt: skip
+BALL: dict[str, Any] = {
+    "mass": 0.17,
+    "inertia": [0.4 * 0.17 * RADIUS**2] * 3,
+    "position": [0, 0, RADIUS, *UPRIGHT],
+    "shapes": [{"kind": "sphere", "radius": RADIUS}],
+}
 
 
-@pytest.mark.parametrize(("turning", "share"), [(2.0 / RADIUS, 1.0), (0.0, 5.0 / 7.0), (-2.0 / RADIUS, 3.0 / 7.0)])
+@pytest.mark.parametrize(
+    ("turning", "share"), [(2.0 / RADIUS, 1.0), (0.0, 5.0 / 7.0), (-2.0 / RADIUS, 3.0 / 7.0)]
+)
 def test_a_billiard_ball_ends_rolling(turning: float, share: float) -> None:
-    """At 2 m/s, rolling, sliding, with back spin: v = (5 v₀ + 2 ω₀ r)/7 and x = v t + (v₀ − v)²/(2 μ g).
+    """At 2 m/s, rolling, sliding, with back spin: v = (5 v₀ + 2 ω₀ r)/7 and x = v t + (v₀ − v)²/(2
+    μ g).
 
-    Friction acts at once at the start of a step, so sliding ends short by half a step at the lost speed.
+    Friction acts at once at the start of a step, so sliding ends short by half a step at the lost
+    speed.
     """
-    run = simulate(scene_of(BALL | {"velocity": [2, 0, 0, 0, turning, 0]}, gravity=G, floor=0.0,
-                            contact={"restitution": 0.0, "friction": 0.2}),
-                   RigidConstraints(friction="coulomb"), steps=650)  # fmt: skip
+    run = simulate(
+        scene_of(
+            BALL | {"velocity": [2, 0, 0, 0, turning, 0]},
+            gravity=G,
+            floor=0.0,
+            contact={"restitution": 0.0, "friction": 0.2},
+        ),
+        RigidConstraints(friction="coulomb"),
+        steps=650,
+    )
     slid = (2.0 - 2.0 * share) ** 2 / (2.0 * 0.2 * G)
     short = 0.5e-3 * (2.0 - 2.0 * share)
-    assert run.q[-1, :3] == pytest.approx([0.65 * 2.0 * share + slid - short, 0.0, RADIUS], abs=1e-9 + 0.02 * short)
+    assert run.q[-1, :3] == pytest.approx(
+        [0.65 * 2.0 * share + slid - short, 0.0, RADIUS], abs=1e-9 + 0.02 * short
+    )
     assert np.linalg.norm(run.v[-1, :3]) == pytest.approx(2.0 * share, rel=1e-9)
     assert np.linalg.norm(run.v[-1, 3:]) * RADIUS == pytest.approx(2.0 * share, rel=1e-9)
 
 
 @pytest.mark.parametrize("spin", [10.0, 1000.0])
 def test_an_eccentric_disc_that_turns_fast_stays_on_the_floor(spin: float) -> None:
-    """No friction: (I + m c² cos² θ) θ'²/2 − m g c sin θ is constant, and the height is r − c sin θ.
+    """No friction: (I + m c² cos² θ) θ'²/2 − m g c sin θ is constant, and the height is r − c sin
+    θ.
 
-    Gravity holds it down against c θ'². The truth keeps the contact by an acceleration, J̇v, found by differences.
+    Gravity holds it down against c θ'². The truth keeps the contact by an acceleration, J̇v, found
+    by differences.
     """
     mass, inertia, radius, arm, gravity = 1.0, 2e-3, 0.05, 0.01, 0.024 * spin**2
-    disc = {"inertia": inertia, "position": [0, radius, 0], "velocity": [0, -arm * spin, spin],
-            "shapes": [{"kind": "circle", "radius": radius, "center": [arm, 0]}]}  # fmt: skip
+    disc = {
+        "inertia": inertia,
+        "position": [0, radius, 0],
+        "velocity": [0, -arm * spin, spin],
+        "shapes": [{"kind": "circle", "radius": radius, "center": [arm, 0]}],
+    }
     scene = scene_of(disc, space=False, gravity=gravity, floor=0.0, contact={"restitution": 0.0})
     _, q, v = by_events(scene, 10.0 / spin)
     angle, rate = q[:, 2], v[:, 2]
     assert q[:, 1] == pytest.approx(radius - arm * np.sin(angle), abs=1e-10)
-    energy = 0.5 * (inertia + mass * arm**2 * np.cos(angle) ** 2) * rate**2 - mass * gravity * arm * np.sin(angle)
+    energy = 0.5 * (
+        inertia + mass * arm**2 * np.cos(angle) ** 2
+    ) * rate**2 - mass * gravity * arm * np.sin(angle)
     assert energy == pytest.approx(energy[0], rel=1e-9)
 
 
-# --- mechanisms without velocity terms, and limits ----------------------------------------------------------------
+# --- mechanisms without velocity terms, and limits
+# ----------------------------------------------------------------
 def test_bias_is_found_where_it_is_and_nowhere_else() -> None:
-    """By trial here, by the structure of the mechanism in the engine: two ways to the same answer."""
+    """By trial here, by the structure of the mechanism in the engine: two ways to the same
+    answer."""
     found = [mechanism_of(load_scene(find_scene(name))) for name in scene_names()]
     found += [random_mechanism(np.random.default_rng(seed), 1 + seed % 3) for seed in range(40)]
-    assert {(m.has_velocity_terms, model_of(m).has_bias) for m in found} <= {(True, True), (False, False)}
+    assert {(m.has_velocity_terms, model_of(m).has_bias) for m in found} <= {
+        (True, True),
+        (False, False),
+    }
 
 
 def test_a_motion_too_fast_for_the_step_is_an_error() -> None:
-    mechanics = model_of(Mechanism([Body("top", None, Joint("spherical"), mass=1.0, inertia=np.diag(MOMENTS))]))
+    mechanics = model_of(
+        Mechanism([Body("top", None, Joint("spherical"), mass=1.0, inertia=np.diag(MOMENTS))])
+    )
     with pytest.raises(SolverError, match="too fast for a step of 0.001 s"):
         free_motion(mechanics, np.array(UPRIGHT), np.array([3e7, 1e7, 1e7]), 1e-3)
 
 
 def test_a_model_in_another_order_and_an_unknown_body_are_refused() -> None:
-    root, left, right, hand = (Body(name, parent, Joint("revolute"), mass=1.0, inertia=np.eye(3)) for name, parent in
-                               (("root", None), ("left", "root"), ("right", "root"), ("hand", "left")))  # fmt: skip
+    root, left, right, hand = (
+        Body(name, parent, Joint("revolute"), mass=1.0, inertia=np.eye(3))
+        for name, parent in (("root", None), ("left", "root"), ("right", "root"), ("hand", "left"))
+    )
     model = rigid_body.model_of(Mechanism([root, left, hand, right]))
     with pytest.raises(ArgumentError, match="depth-first"):
         rigid_body.model_of(Mechanism([root, left, right, hand]))

@@ -1,4 +1,5 @@
-"""MuJoCo as a world keeps the laws of mechanics on our scenes; each beside a closed form or our own worlds."""
+"""MuJoCo as a world keeps the laws of mechanics on our scenes; each beside a closed form or our own
+worlds."""
 
 from __future__ import annotations
 
@@ -38,10 +39,24 @@ GROUND = {"name": "floor", "kind": "half_space", "point": [0, 0, 0], "normal": [
 
 
 def ball(restitution: float, **more: Any) -> Scene:
-    body = {"name": "ball", "joint": "free_flyer", "mass": 0.3, "inertia": [1e-4] * 3,
-            "shapes": [{"kind": "sphere", "radius": 0.05}], "position": [0, 0, 0.3, 0, 0, 0, 1]}  # fmt: skip
-    values = {"name": "ball", "dimensions": 3, "rate": 1000, "duration": 0.5, "gravity": [0, 0, -9.81],
-              "bodies": [body], "walls": [GROUND], "contact": {"restitution": restitution}}  # fmt: skip
+    body = {
+        "name": "ball",
+        "joint": "free_flyer",
+        "mass": 0.3,
+        "inertia": [1e-4] * 3,
+        "shapes": [{"kind": "sphere", "radius": 0.05}],
+        "position": [0, 0, 0.3, 0, 0, 0, 1],
+    }
+    values = {
+        "name": "ball",
+        "dimensions": 3,
+        "rate": 1000,
+        "duration": 0.5,
+        "gravity": [0, 0, -9.81],
+        "bodies": [body],
+        "walls": [GROUND],
+        "contact": {"restitution": restitution},
+    }
     return scene_from_values(values | more)
 
 
@@ -75,7 +90,8 @@ def test_the_damping_ratio_gives_the_restitution(restitution: float) -> None:
 
 
 def test_free_bodies_and_joints_move_as_in_our_worlds() -> None:
-    """A URDF arm with a free base: quaternions, body axes and the order of joints agree with ours."""
+    """A URDF arm with a free base: quaternions, body axes and the order of joints agree with
+    ours."""
     case = CASES["floating_robot"]
     scene = scene_from_values(case.scene).with_values({"duration": 0.2})
     theirs, ours = simulate(scene, world="mujoco"), simulate(scene)
@@ -102,13 +118,22 @@ def test_what_a_run_lacks_is_absent() -> None:
     assert run.law_settings["version"] and run.law_settings["impact_steps"] == 8.0
 
 
-@pytest.mark.parametrize(("values", "ignored"), [
-    ({"contact": "paper"}, ["contact.forces"]),
-    ({"contact": {"restitution": 0.9 * LEAST_RESTITUTION}}, ["contact.restitution"]),
-    ({"hand": {"body": "ball"}, "device": {"delay": 1},
-      "couplings": {"four_channel": {"stiffness": [1] * 6, "damping": [1] * 6}}}, ["couplings", "device"]),
-    ({"hand": {"body": "ball"}}, []),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("values", "ignored"),
+    [
+        ({"contact": "paper"}, ["contact.forces"]),
+        ({"contact": {"restitution": 0.9 * LEAST_RESTITUTION}}, ["contact.restitution"]),
+        (
+            {
+                "hand": {"body": "ball"},
+                "device": {"delay": 1},
+                "couplings": {"four_channel": {"stiffness": [1] * 6, "damping": [1] * 6}},
+            },
+            ["couplings", "device"],
+        ),
+        ({"hand": {"body": "ball"}}, []),
+    ],
+)
 def test_what_it_ignores_is_named(values: dict[str, Any], ignored: list[str]) -> None:
     assert list(MuJoCo().ignored(ball(0.5, **values))) == ignored
 

@@ -1,4 +1,5 @@
-"""Rigid steps by hand and by their conditions, contacts and rows; rigid worlds; the paper's worlds by name."""
+"""Rigid steps by hand and by their conditions, contacts and rows; rigid worlds; the paper's worlds
+by name."""
 
 from __future__ import annotations
 
@@ -34,17 +35,29 @@ BAR, ENDS = np.diag([1.0, 1.0 / 12.0]), np.array([[1.0, 0.5], [1.0, -0.5]])
 
 def step(mass, v, f, rows, gap, e, **options):  # type: ignore[no-untyped-def]
     rows, v = np.atleast_2d(np.asarray(rows, float)), np.asarray(v, float)
-    return rigid_step(np.asarray(mass, float), v, np.asarray(f, float), DT, rows, np.asarray(gap, float), rows @ v, e,
-                      **options)  # fmt: skip
+    return rigid_step(
+        np.asarray(mass, float),
+        v,
+        np.asarray(f, float),
+        DT,
+        rows,
+        np.asarray(gap, float),
+        rows @ v,
+        e,
+        **options,
+    )
 
 
 # one mass of 2 kg at −1 m/s: gap, restitution, options, v⁺
 HAND = [
     (1e-4, 0.0, {}, -1e-4 / DT),  # an open plastic contact closes exactly and does not pass
-    (1e-4, 0.0, {"scheme": "moreau"}, -1.0), (1e-9, 0.5, {}, -1.0),  # an open elastic contact is left alone
-    (0.0, 0.0, {}, 0.0), (0.0, 0.3, {}, 0.3), (0.0, 1.0, {}, 1.0),  # a closed contact obeys Newton
+    (1e-4, 0.0, {"scheme": "moreau"}, -1.0),
+    (1e-9, 0.5, {}, -1.0),  # an open elastic contact is left alone
+    (0.0, 0.0, {}, 0.0),
+    (0.0, 0.3, {}, 0.3),
+    (0.0, 1.0, {}, 1.0),  # a closed contact obeys Newton
     (0.0, 0.5, {"scheme": "stewart-trinkle"}, 0.5),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("gap", "e", "options", "expected"), HAND)
@@ -56,7 +69,8 @@ def test_one_mass_by_hand(gap: float, e: float, options: Any, expected: float) -
 
 @given(st.integers(0, 10_000))
 def test_every_step_satisfies_its_conditions(seed: int) -> None:
-    """Feasible, non-adhesive, complementary, dynamics kept; a plastic closed step without load never gains energy."""
+    """Feasible, non-adhesive, complementary, dynamics kept; a plastic closed step without load
+    never gains energy."""
     rng = np.random.default_rng(seed)
     d, c = int(rng.integers(1, 7)), int(rng.integers(1, 9))
     root = rng.normal(size=(d, d))
@@ -68,74 +82,103 @@ def test_every_step_satisfies_its_conditions(seed: int) -> None:
     scale = np.abs(rows).max() * max(np.abs(v).max(), np.abs(result.velocity).max()) + 1.0
     assert (rows @ result.velocity - bound).min() >= -1e-9 * scale and result.impulse.min() >= 0.0
     left = mass @ (result.velocity - v) - rows.T @ result.impulse
-    assert np.abs(left).max() <= 1e-9 * scale * np.abs(mass).max() and result.residual <= stepping.STEP_TOLERANCE
+    assert (
+        np.abs(left).max() <= 1e-9 * scale * np.abs(mass).max()
+        and result.residual <= stepping.STEP_TOLERANCE
+    )
     if gap.max() <= 0.0:
         assert result.velocity @ mass @ result.velocity <= (1.0 + 1e-12) * (v @ mass @ v)
 
 
 def test_facing_contacts_with_restitution_step_by_poisson_and_say_so() -> None:
-    """A mass between two closed walls: no velocity obeys Newton at both; Poisson's step stops it."""
+    """A mass between two closed walls: no velocity obeys Newton at both; Poisson's step stops
+    it."""
     result = step([[1.0]], [-1.0], [0.0], [[1.0], [-1.0]], [0.0, 0.0], 0.5)
     assert result.restitution_law == POISSON and result.impulse == pytest.approx([1.5, 0.5])
     assert result.velocity[0] == pytest.approx(0.0, abs=1e-15)
     assert step([[1.0]], [-1.0], [0.0], [[1.0], [-1.0]], [0.0, 1.0], 0.5).restitution_law == NEWTON
     early = step(np.eye(1), [-1.0], [0.0], [[1.0]], [1e-4], 0.5, scheme="stewart-trinkle")
-    assert early.restitution_law == POISSON and 1e-4 + DT * early.velocity[0] >= 0.0  # before it passes
+    assert (
+        early.restitution_law == POISSON and 1e-4 + DT * early.velocity[0] >= 0.0
+    )  # before it passes
 
 
 def test_a_resting_contact_under_load_does_not_hop() -> None:
     found = step([[1.0]], [0.0], [-9.81], [[1.0]], [0.0], 0.5, scheme="stewart-trinkle")
-    assert found.velocity == pytest.approx([0.0], abs=1e-15) and found.impulse == pytest.approx([9.81 * DT])
-    assert step([[1.0]], [0.1], [-100.0], [[1.0]], [0.0], 0.5).restitution_law == NEWTON  # the load closes it
+    assert found.velocity == pytest.approx([0.0], abs=1e-15) and found.impulse == pytest.approx(
+        [9.81 * DT]
+    )
+    assert (
+        step([[1.0]], [0.1], [-100.0], [[1.0]], [0.0], 0.5).restitution_law == NEWTON
+    )  # the load closes it
 
 
 def test_an_open_contact_may_not_pass_where_its_own_restitution_is_zero() -> None:
     gap, v = np.array([1e-4, 1e-4]), np.array([-1.0, -1.0])
     found = rigid_step(np.eye(2), v, np.zeros(2), DT, np.eye(2), gap, v, np.array([0.0, 0.5]))
-    assert gap[0] + DT * found.velocity[0] == pytest.approx(0.0, abs=1e-18) and found.velocity[1] == -1.0
+    assert (
+        gap[0] + DT * found.velocity[0] == pytest.approx(0.0, abs=1e-18)
+        and found.velocity[1] == -1.0
+    )
 
 
 def test_a_wrong_multiplier_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("daqp", "quadprog", "gauss_seidel"):
-        assert step([[2.0]], [-1.0], [0.0], [[1.0]], [0.0], 0.0).velocity[0] == pytest.approx(0.0)  # by those left
-        monkeypatch.setitem(stepping.STEP_SOLVERS, name, lambda rows, offset: np.full(len(offset), 0.123))
+        assert step([[2.0]], [-1.0], [0.0], [[1.0]], [0.0], 0.0).velocity[0] == pytest.approx(
+            0.0
+        )  # by those left
+        monkeypatch.setitem(
+            stepping.STEP_SOLVERS, name, lambda rows, offset: np.full(len(offset), 0.123)
+        )
     with pytest.raises(SolverError, match="residual"):
         step([[2.0]], [-1.0], [0.0], [[1.0]], [0.0], 0.0)
 
 
 def test_velocities_that_cancel_are_judged_by_their_rounding() -> None:
-    """A gram under a tonne, at rest: 5e3 m/s from above and from below leave 1e-12 m/s, not a wrong active set."""
+    """A gram under a tonne, at rest: 5e3 m/s from above and from below leave 1e-12 m/s, not a wrong
+    active set."""
     mass, load = np.diag([1e-3, 1e3]), np.array([-9.81e-3, -9.81e3])
     result = step(mass, [0.0, 0.0], load, [[1.0, 0.0], [-1.0, 1.0]], [0.0, 0.0], 0.0)
     assert np.abs(result.velocity).max() <= 1e-11
     assert result.impulse == pytest.approx([9.81e3 * DT, 9.81e3 * DT], rel=1e-5)
 
 
-@pytest.mark.parametrize(("call", "given_"), [
-    (velocity_bounds, {"restitution": np.array([0.5])}), (velocity_bounds, {"restitution": np.array([0.5, 1.5])}),
-    (velocity_bounds, {"restitution": -0.1}), (velocity_bounds, {"stabilization": 2.0, "restitution": 0.0}),
-    (velocity_bounds, {"scheme": "euler", "restitution": 0.0}), (RigidConstraints, {"scheme": "euler"}),
-    (RigidConstraints, {"friction": "viscous"}),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("call", "given_"),
+    [
+        (velocity_bounds, {"restitution": np.array([0.5])}),
+        (velocity_bounds, {"restitution": np.array([0.5, 1.5])}),
+        (velocity_bounds, {"restitution": -0.1}),
+        (velocity_bounds, {"stabilization": 2.0, "restitution": 0.0}),
+        (velocity_bounds, {"scheme": "euler", "restitution": 0.0}),
+        (RigidConstraints, {"scheme": "euler"}),
+        (RigidConstraints, {"friction": "viscous"}),
+    ],
+)
 def test_settings_out_of_range_are_refused(call: Any, given_: dict[str, Any]) -> None:
     first = (np.zeros(2), np.zeros(2)) if call is velocity_bounds else ()
     with pytest.raises(ArgumentError, match=next(iter(given_))):
         call(*first, **given_ | ({"dt": DT} if first else {}))
 
 
-# --- restitution: one e for all contacts, or one for each -----------------------------------------------------------
+# --- restitution: one e for all contacts, or one for each
+# -----------------------------------------------------------
 @pytest.mark.parametrize("e", [(1.0, 0.0), (0.3, 0.8), (0.5, 0.5)])
 def test_each_contact_returns_its_own_share(e: tuple[float, float]) -> None:
-    """A bar falls flat on its two ends: J v⁺ = −E J v⁻ at both, by Newton's law; equal e is the scalar's step."""
+    """A bar falls flat on its two ends: J v⁺ = −E J v⁻ at both, by Newton's law; equal e is the
+    scalar's step."""
     found = step(BAR, [-1.0, 0.0], [0.0, 0.0], ENDS, [0.0, 0.0], np.array(e))
     assert found.restitution_law == NEWTON
     assert ENDS @ found.velocity == pytest.approx(e, abs=1e-14)
     if e[0] == e[1]:
-        assert np.array_equal(found.velocity, step(BAR, [-1.0, 0.0], [0.0, 0.0], ENDS, [0.0, 0.0], e[0]).velocity)
+        assert np.array_equal(
+            found.velocity, step(BAR, [-1.0, 0.0], [0.0, 0.0], ENDS, [0.0, 0.0], e[0]).velocity
+        )
 
 
 def test_a_load_at_rest_is_not_thrown_by_rounding() -> None:
-    """Speeds of 1e-17 m/s of both signs on the feet of a loaded box: it is carried, e = 1 or not."""
+    """Speeds of 1e-17 m/s of both signs on the feet of a loaded box: it is carried, e = 1 or
+    not."""
     v = np.linalg.solve(ENDS, [-1e-17, 1e-17])
     found = step(BAR, v, [-9.81, 0.0], ENDS, [0.0, 0.0], 1.0)
     assert found.restitution_law == NEWTON and np.abs(found.velocity).max() <= 1e-15
@@ -161,7 +204,9 @@ def test_boxes_in_space_overlap_as_coal_says() -> None:
         axes = np.array([np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(2)] + [np.eye(3)])
         axes[:2] *= np.sign(np.linalg.det(axes[:2]))[:, None, None]
         origins = np.array([np.zeros(3), rng.normal(scale=0.6, size=3), np.zeros(3)])
-        shapes = make_shapes([Shape(BOX, k, half_size=0.5 * size) for k, size in enumerate(sizes)], True)
+        shapes = make_shapes(
+            [Shape(BOX, k, half_size=0.5 * size) for k, size in enumerate(sizes)], True
+        )
         found = find_contacts(shapes, candidate_pairs(shapes), axes, origins, 0.0)
         (one, other), result = (coal.Box(*size) for size in sizes), coal.CollisionResult()
         poses = [coal.Transform3s(axes[k], origins[k]) for k in range(2)]
@@ -169,22 +214,32 @@ def test_boxes_in_space_overlap_as_coal_says() -> None:
             assert not len(found.gap) or found.gap.min() > -1e-6
             continue
         depth, compared = result.getContact(0).penetration_depth, compared + 1
-        assert found.gap.min() == pytest.approx(depth, abs=1e-6 + contact_finding.EDGE_SHARE * abs(depth))
+        assert found.gap.min() == pytest.approx(
+            depth, abs=1e-6 + contact_finding.EDGE_SHARE * abs(depth)
+        )
     assert compared > 50
 
 
 def linkage() -> Mechanism:
     """Two links in a chain and a free peg."""
     inertia, elbow = np.diag([0.1, 0.1, 0.1]), (np.eye(3), np.array([1.0, 0.0, 0.0]))
-    return Mechanism([Body("upper", None, Joint("revolute"), mass=1.0, inertia=inertia),
-                      Body("lower", "upper", Joint("revolute"), elbow, mass=1.0, inertia=inertia),
-                      Body("peg", None, Joint("planar"), mass=2.0, inertia=inertia)])  # fmt: skip
+    return Mechanism(
+        [
+            Body("upper", None, Joint("revolute"), mass=1.0, inertia=inertia),
+            Body("lower", "upper", Joint("revolute"), elbow, mass=1.0, inertia=inertia),
+            Body("peg", None, Joint("planar"), mass=2.0, inertia=inertia),
+        ]
+    )
 
 
-def rows_of(q: np.ndarray, bodies: list[tuple[int, int]], points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+def rows_of(
+    q: np.ndarray, bodies: list[tuple[int, int]], points: np.ndarray, normals: np.ndarray
+) -> np.ndarray:
     a, b = np.array(bodies, np.int32).T
     nothing = np.zeros(len(a), np.int32)
-    found = Contacts(nothing, nothing, a, b, nothing.astype(np.int64), points, normals, np.zeros(len(a)))
+    found = Contacts(
+        nothing, nothing, a, b, nothing.astype(np.int64), points, normals, np.zeros(len(a))
+    )
     return contact_jacobian(normals, found, *model_of(linkage()).bodies(q)[1:])
 
 
@@ -197,16 +252,25 @@ def test_a_straight_arm_struck_along_itself_has_no_row() -> None:
 @pytest.mark.parametrize("friction", ["coulomb", "relaxed"])
 def test_a_box_slides_straight_in_space_and_stops_where_the_textbook_says(friction: str) -> None:
     """v²/(2 μ g) = 21 mm along (0.6, 0.8); the relaxed law throws it up, at μ v at most."""
-    plate = {"inertia": [4e-4] * 3, "shapes": [{"kind": "box", "size": [0.2, 0.2, 0.02]}],
-             "position": [0, 0, 0.01, 0, 0, 0, 1], "velocity": [0.3, 0.4, 0, 0, 0, 0]}  # fmt: skip
+    plate = {
+        "inertia": [4e-4] * 3,
+        "shapes": [{"kind": "box", "size": [0.2, 0.2, 0.02]}],
+        "position": [0, 0, 0.01, 0, 0, 0, 1],
+        "velocity": [0.3, 0.4, 0, 0, 0, 0],
+    }
     scene = scene_of(plate, gravity=9.81, floor=0.0, contact={"restitution": 0, "friction": 0.6})
     run = simulate(scene, RigidConstraints(friction=friction), steps=110)
     expected, near = 0.5**2 / (2.0 * 0.6 * 9.81), {"coulomb": 1e-3, "relaxed": 2e-3}[friction]
-    assert run.complete and run.q[-1, :2] == pytest.approx(expected * np.array([0.6, 0.8]), abs=near)
+    assert run.complete and run.q[-1, :2] == pytest.approx(
+        expected * np.array([0.6, 0.8]), abs=near
+    )
     assert np.abs(run.v[-1]).max() < 2e-2
     drag = run.contacts.friction_force[: run.contacts.offsets[1]].sum(axis=0)  # [N]
     assert drag == pytest.approx(run.friction_force[0, :3], abs=1e-9) and np.linalg.norm(drag) > 5.0
-    assert run.q[:, 2].max() <= 0.01 + {"coulomb": 1e-9, "relaxed": (0.6 * 0.5) ** 2 / (2.0 * 9.81)}[friction]
+    assert (
+        run.q[:, 2].max()
+        <= 0.01 + {"coulomb": 1e-9, "relaxed": (0.6 * 0.5) ** 2 / (2.0 * 9.81)}[friction]
+    )
 
 
 @pytest.mark.parametrize("size", [2, 3])
@@ -216,7 +280,9 @@ def test_friction_never_leaves_its_cone_and_leaves_no_contact_closing(size: int)
     for _ in range(20):
         rows = rng.normal(size=(6, size, 5))
         bound, v_free = rng.normal(size=6) * 0.1 - 0.3, rng.normal(size=5)
-        v, normal, tangential = friction_step(np.eye(5), v_free, rows[:, 0], rows[:, 1:], bound, 0.4)
+        v, normal, tangential = friction_step(
+            np.eye(5), v_free, rows[:, 0], rows[:, 1:], bound, 0.4
+        )
         assert (rows[:, 0] @ v - bound).min() >= -1e-6 * np.abs(v_free).max()
         assert (np.linalg.norm(tangential, axis=1) <= 0.4 * normal + 1e-9).all()
         change = np.einsum("ck,ckd->d", np.column_stack([normal, tangential]), rows)
@@ -229,14 +295,21 @@ def test_contacts_without_a_common_body_are_solved_apart() -> None:
     rows[::2, :, :6], rows[1::2, :, 6:] = parts
     v, normal, _ = friction_step(np.eye(12), v_free, rows[:, 0], rows[:, 1:], np.zeros(6), 0.3)
     for part, at in zip(parts, (slice(0, 6), slice(6, 12)), strict=True):
-        alone, _, _ = friction_step(np.eye(6), v_free[at], part[:, 0], part[:, 1:], np.zeros(3), 0.3)
+        alone, _, _ = friction_step(
+            np.eye(6), v_free[at], part[:, 0], part[:, 1:], np.zeros(3), 0.3
+        )
         assert v[at] == pytest.approx(alone, abs=1e-9)
     assert (normal > 0.0).any()
 
 
 def test_the_parts_of_a_step_add_up_to_the_change_of_momentum_and_the_peg_comes_to_rest() -> None:
     system = System(load_scene(find_scene("peg_corner")))
-    state, force, dt, law = system.make_state(), np.array([-3.2, 4.0, 0.0]), 1.0 / 512, RigidConstraints()
+    state, force, dt, law = (
+        system.make_state(),
+        np.array([-3.2, 4.0, 0.0]),
+        1.0 / 512,
+        RigidConstraints(),
+    )
     mass, deepest, states = mechanics_of(system).mass_matrix(state.q), 0.0, set()
     for _ in range(1500):
         before = state.v.copy()
@@ -247,41 +320,70 @@ def test_the_parts_of_a_step_add_up_to_the_change_of_momentum_and_the_peg_comes_
         state.q[:], state.v[:] = result.q, result.v
         states.add(result.state)
         deepest = min(deepest, state.contacts.gap[: state.contact_count[0]].min(initial=0.0))
-    assert states == {FREE, COLLIDING, RESTING} and deepest >= -1e-4  # corners turn while they touch
+    assert (
+        states == {FREE, COLLIDING, RESTING} and deepest >= -1e-4
+    )  # corners turn while they touch
     assert np.abs(state.v).max() <= 1e-9 and np.abs(result.penalty_force + force).max() <= 1e-6
 
 
 def test_the_bar_on_two_posts_gains_nothing_and_follows_the_law_of_the_scheme() -> None:
-    """Posts with e = 0 and 1, on which equalities end with 12.167 J: Poisson's law loses what the near post stops.
+    """Posts with e = 0 and 1, on which equalities end with 12.167 J: Poisson's law loses what the
+    near post stops.
 
-    Newton's law (Moreau's step, both posts closed) lets the far post alone return all: 0.5 J are kept.
+    Newton's law (Moreau's step, both posts closed) lets the far post alone return all: 0.5 J are
+    kept.
     """
     scene = load_scene(find_scene("bar_on_posts"))
     engine = simulate(scene).energy["kinetic"][-1]
     for scheme, expected in (("automatic", engine), ("moreau", 0.5), ("stewart-trinkle", engine)):
         kinetic = simulate(scene, RigidConstraints(scheme=scheme)).energy["kinetic"]
-        assert kinetic.max() <= 0.5 * (1.0 + 1e-12) and kinetic[-1] == pytest.approx(expected, rel=1e-3)
-    half = simulate(scene.with_values({"walls.far.restitution": 0.5}), RigidConstraints(scheme="moreau"))
-    assert half.energy["kinetic"][-1] == pytest.approx(0.40625, rel=1e-3)  # ½ − ½ (1 − e²) γ²/W, W = 4
+        assert kinetic.max() <= 0.5 * (1.0 + 1e-12) and kinetic[-1] == pytest.approx(
+            expected, rel=1e-3
+        )
+    half = simulate(
+        scene.with_values({"walls.far.restitution": 0.5}), RigidConstraints(scheme="moreau")
+    )
+    assert half.energy["kinetic"][-1] == pytest.approx(
+        0.40625, rel=1e-3
+    )  # ½ − ½ (1 − e²) γ²/W, W = 4
 
 
 def test_a_blow_through_resting_balls_is_one_impact_and_a_load_elsewhere_is_none() -> None:
-    """One of three equal balls strikes two that touch, e = 0: they go on at a third, 1/3 J is lost; two stand apart."""
+    """One of three equal balls strikes two that touch, e = 0: they go on at a third, 1/3 J is lost;
+    two stand apart."""
     ball = {"joint": "prismatic", "axis": [1, 0], "shapes": [{"kind": "circle", "radius": 0.1}]}
-    line = [ball | {"position": [x], "velocity": [float(x == 0.0)]} for x in (0.0, 0.2, 0.4, 5.0, 5.2)]
-    scene = scene_of(*line, space=False, contact={"restitution": 0}, hand={"body": "body_3", "force": [3, 0, 0]})
+    line = [
+        ball | {"position": [x], "velocity": [float(x == 0.0)]} for x in (0.0, 0.2, 0.4, 5.0, 5.2)
+    ]
+    scene = scene_of(
+        *line, space=False, contact={"restitution": 0}, hand={"body": "body_3", "force": [3, 0, 0]}
+    )
     run = simulate(scene, RigidConstraints(), steps=5)
-    assert len(run.impacts.step) == 1 and run.impacts.energy_lost[0] == pytest.approx(1.0 / 3.0, rel=1e-12)
-    assert run.impacts.v_plus[0, :3] == pytest.approx([1.0 / 3.0] * 3) and not run.impacts.impulse[0, 3:].any()
-    assert run.penalty_force[0, 3:] == pytest.approx([-1.5, 1.5], rel=1e-9)  # the pushed pair shares the hand's force
+    assert len(run.impacts.step) == 1 and run.impacts.energy_lost[0] == pytest.approx(
+        1.0 / 3.0, rel=1e-12
+    )
+    assert (
+        run.impacts.v_plus[0, :3] == pytest.approx([1.0 / 3.0] * 3)
+        and not run.impacts.impulse[0, 3:].any()
+    )
+    assert run.penalty_force[0, 3:] == pytest.approx(
+        [-1.5, 1.5], rel=1e-9
+    )  # the pushed pair shares the hand's force
 
 
-# --- cost ---------------------------------------------------------------------------------------------------------
+# --- cost
+# ---------------------------------------------------------------------------------------------------------
 def row(count: int, space: bool, shape: dict[str, Any]) -> Scene:
     """Bodies of one shape in a row on a floor."""
     inertia, turn = ([1e-3] * 3, [0.05, 0, 0, 0, 1]) if space else (1e-3, [0.0])
-    bodies = ({"shapes": [shape], "inertia": inertia, "position": [0.12 * i, 0.0 if space else 0.05, *turn]}
-              for i in range(count))  # fmt: skip
+    bodies = (
+        {
+            "shapes": [shape],
+            "inertia": inertia,
+            "position": [0.12 * i, 0.0 if space else 0.05, *turn],
+        }
+        for i in range(count)
+    )
     return scene_of(*bodies, space=space, floor=0.0, duration=0.003)
 
 
@@ -289,9 +391,13 @@ CIRCLE, BALL_ = {"kind": "circle", "radius": 0.05}, {"kind": "sphere", "radius":
 SQUARE, CUBE = {"kind": "box", "size": [0.1, 0.1]}, {"kind": "box", "size": [0.1, 0.1, 0.1]}
 
 
-@pytest.mark.parametrize(("space", "shape", "most"), [(False, CIRCLE, 1.0), (True, BALL_, 1.0), (False, SQUARE, 1.0),
-                                                      (True, CUBE, 2.0)])  # fmt: skip
-def test_the_contacts_are_those_of_a_step_or_at_most_twice_as_many(space: bool, shape: Any, most: float) -> None:
+@pytest.mark.parametrize(
+    ("space", "shape", "most"),
+    [(False, CIRCLE, 1.0), (True, BALL_, 1.0), (False, SQUARE, 1.0), (True, CUBE, 2.0)],
+)
+def test_the_contacts_are_those_of_a_step_or_at_most_twice_as_many(
+    space: bool, shape: Any, most: float
+) -> None:
     system = System(row(8, space, shape))
     state, cost = system.make_state(), RigidConstraints().cost(system)
     given = len(find_rows(system, state.q, state.v, np.inf).gap)
@@ -303,7 +409,9 @@ def test_too_many_are_refused_before_the_first_step(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(time_stepping, "MOST_ENTRIES", 500)
     assert run_world(row(4, False, CIRCLE), "ideal").complete
     for world in ("ideal", "ideal-friction"):
-        with pytest.raises(ArgumentError, match=r"at most 500 numbers .* 36 contacts of 24 coordinates have 864"):
+        with pytest.raises(
+            ArgumentError, match=r"at most 500 numbers .* 36 contacts of 24 coordinates have 864"
+        ):
             run_world(row(8, False, CIRCLE), world)
 
 
@@ -324,14 +432,20 @@ def test_a_world_is_a_law_and_a_coupling_with_the_scenes_gains(name: str) -> Non
     assert world.coupling_in(PEG.with_values({"couplings": {}})).name == "none"
 
 
-@pytest.mark.parametrize(("call", "says"), [
-    (lambda: run_world("peg_cornre", "PB"), "peg_corner"),
-    (lambda: find_world("CBuc").coupling_in(PEG.with_values({"couplings.unilateral": None})), "gives no gains"),
-    (lambda: find_world("ideal", "spread"), "rendering = 'spread': expected full.*ideal"),
-    (lambda: find_world("PB", "spread"), "rendering = 'spread': expected full.*PB"),
-    (lambda: find_world("IAPB", "clip"), "rendering = 'clip'"),
-    (lambda: find_world("best"), "world = 'best': expected one of IAPB, PB, "),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("call", "says"),
+    [
+        (lambda: run_world("peg_cornre", "PB"), "peg_corner"),
+        (
+            lambda: find_world("CBuc").coupling_in(PEG.with_values({"couplings.unilateral": None})),
+            "gives no gains",
+        ),
+        (lambda: find_world("ideal", "spread"), "rendering = 'spread': expected full.*ideal"),
+        (lambda: find_world("PB", "spread"), "rendering = 'spread': expected full.*PB"),
+        (lambda: find_world("IAPB", "clip"), "rendering = 'clip'"),
+        (lambda: find_world("best"), "world = 'best': expected one of IAPB, PB, "),
+    ],
+)
 def test_worlds_that_cannot_be_are_refused(call: Callable[[], Any], says: str) -> None:
     with pytest.raises(ArgumentError, match=says):
         call()

@@ -12,15 +12,27 @@ from iapb.schema import blank, quantities
 STEPS, UNTOUCHED = 128, 40
 NAMES = ("peg.x", "peg.y", "peg.theta")
 TEXTS = {
-    "scene_name": "peg", "scene_source": "name: peg\n# with a comment, é\n", "world": "IAPB",
+    "scene_name": "peg",
+    "scene_source": "name: peg\n# with a comment, é\n",
+    "world": "IAPB",
     "scene_resolved": {"name": "peg", "rate": 512, "bodies": [{"mass": 2.0}]},
-    "law": "impulse augmented", "law_settings": {"restitution": 0.0, "limits": [15.0, 15.0, 1.0]},
-    "coupling": "four channel", "coupling_settings": {"stiffness": [100.0, 100.0, 0.5]}, "dt": 1 / 512,
-    "complete": True, "coordinate_names": NAMES, "coordinate_units": ("m", "m", "rad"), "velocity_names": NAMES,
-    "velocity_units": ("m/s", "m/s", "rad/s"), "body_names": ("peg",),
-    "effects": (EffectRow("gravity", False, "the scene names none"), EffectRow("friction", True, "μ = 0.3"),
-                EffectRow("contact_damping", False, "no springs", "damping")),
-}  # fmt: skip
+    "law": "impulse augmented",
+    "law_settings": {"restitution": 0.0, "limits": [15.0, 15.0, 1.0]},
+    "coupling": "four channel",
+    "coupling_settings": {"stiffness": [100.0, 100.0, 0.5]},
+    "dt": 1 / 512,
+    "complete": True,
+    "coordinate_names": NAMES,
+    "coordinate_units": ("m", "m", "rad"),
+    "velocity_names": NAMES,
+    "velocity_units": ("m/s", "m/s", "rad/s"),
+    "body_names": ("peg",),
+    "effects": (
+        EffectRow("gravity", False, "the scene names none"),
+        EffectRow("friction", True, "μ = 0.3"),
+        EffectRow("contact_damping", False, "no springs", "damping"),
+    ),
+}
 
 
 def flipped(content, share=0.5):
@@ -34,39 +46,81 @@ def made_run(steps=20, contacts=7, impacts=3, seed=0, **fields):
     rng = np.random.default_rng(seed)
     tool_dofs = fields.pop("tool_dofs", (0, 3))
     device = tool_dofs[1] - tool_dofs[0]
-    lengths = {"time": steps + 1, "step": steps, "step_edge": steps + 1, "contact": contacts, "impact": impacts,
-               "coordinate": 3, "velocity": 3, "device_coordinate": device, "device_velocity": device, "body": 1,
-               "placement": 3, "axis": 3}  # fmt: skip
+    lengths = {
+        "time": steps + 1,
+        "step": steps,
+        "step_edge": steps + 1,
+        "contact": contacts,
+        "impact": impacts,
+        "coordinate": 3,
+        "velocity": 3,
+        "device_coordinate": device,
+        "device_velocity": device,
+        "body": 1,
+        "placement": 3,
+        "axis": 3,
+    }
 
     def filled(listed):
-        return {name: rng.normal(size=array.shape) if array.dtype.kind == "f" else
-                rng.integers(0, 2, array.shape).astype(array.dtype)
-                for name, array in blank(listed, lengths).items()}  # fmt: skip
+        return {
+            name: rng.normal(size=array.shape)
+            if array.dtype.kind == "f"
+            else rng.integers(0, 2, array.shape).astype(array.dtype)
+            for name, array in blank(listed, lengths).items()
+        }
 
     contact, impact = filled(quantities(ContactTable)), filled(quantities(ImpactTable))
-    contact |= {"offsets": np.array([0, *np.sort(rng.integers(0, contacts + 1, steps - 1)), contacts]),
-                "gap": -np.abs(contact["gap"])}  # fmt: skip
+    contact |= {
+        "offsets": np.array([0, *np.sort(rng.integers(0, contacts + 1, steps - 1)), contacts]),
+        "gap": -np.abs(contact["gap"]),
+    }
     impact |= {"step": np.arange(impacts), "energy_lost": np.abs(impact["energy_lost"])}
-    values = TEXTS | filled((*quantities(Run, "time"), *quantities(Run, "step"))) | {
-        "tool_dofs": tool_dofs, "tool_coordinates": tool_dofs, "time": np.arange(steps + 1) / 512,
-        "contacts": ContactTable(**contact), "impacts": ImpactTable(**impact),
-        "energy": {"kinetic": rng.random(steps + 1), "impact_loss": rng.random(steps)},
-        "chunk_steps": np.array([steps], np.int64), "chunk_seconds": np.array([0.5]),
-    }  # fmt: skip
+    values = (
+        TEXTS
+        | filled((*quantities(Run, "time"), *quantities(Run, "step")))
+        | {
+            "tool_dofs": tool_dofs,
+            "tool_coordinates": tool_dofs,
+            "time": np.arange(steps + 1) / 512,
+            "contacts": ContactTable(**contact),
+            "impacts": ImpactTable(**impact),
+            "energy": {"kinetic": rng.random(steps + 1), "impact_loss": rng.random(steps)},
+            "chunk_steps": np.array([steps], np.int64),
+            "chunk_seconds": np.array([0.5]),
+        }
+    )
     return Run(**{**values, **fields})
 
 
 def made_motion(scene, seed):
-    """A made-up motion of a shipped scene: every coordinate swings about its start, some contacts and impacts."""
+    """A made-up motion of a shipped scene: every coordinate swings about its start, some contacts
+    and impacts."""
     loaded = load_scene(find_scene(scene))
     resolved = loaded.resolved()
-    start = np.concatenate([np.asarray(body["position"], dtype=float) for body in resolved["bodies"]])
+    start = np.concatenate(
+        [np.asarray(body["position"], dtype=float) for body in resolved["bodies"]]
+    )
     time = np.arange(STEPS + 1) / 512
     swing = 0.002 * np.sin(np.outer(40 * time, 1 + 0.1 * seed + np.arange(len(start))))
     pose = mechanism_of(loaded).poses(start + swing, planar=True)
-    run = made_run(steps=STEPS, contacts=60, impacts=5, seed=seed, time=time, q=start + swing, pose=pose,
-                   scene_name=scene, scene_resolved=resolved)
-    late = np.where(np.arange(STEPS + 1) < UNTOUCHED, 0, run.contacts.offsets)  # nothing touches before
-    run = replace(run, contacts=replace(run.contacts, offsets=late, point=0.01 * run.contacts.point))
+    run = made_run(
+        steps=STEPS,
+        contacts=60,
+        impacts=5,
+        seed=seed,
+        time=time,
+        q=start + swing,
+        pose=pose,
+        scene_name=scene,
+        scene_resolved=resolved,
+    )
+    late = np.where(
+        np.arange(STEPS + 1) < UNTOUCHED, 0, run.contacts.offsets
+    )  # nothing touches before
+    run = replace(
+        run, contacts=replace(run.contacts, offsets=late, point=0.01 * run.contacts.point)
+    )
     force = np.sin(np.outer(30 * time[1:] + seed, [1.0, 2.0, 3.0])) * [1.0, 1.0, 0.02]
-    return replace(run, device_force=force, device_q=0.01 * np.sin(np.outer(20 * time + seed, [1.0, 2.0, 3.0])))
+    return replace(
+        run, device_force=force, device_q=0.01 * np.sin(np.outer(20 * time + seed, [1.0, 2.0, 3.0]))
+    )

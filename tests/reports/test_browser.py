@@ -1,7 +1,8 @@
-"""The report of made-up records as a reader meets it in a browser that is cut off from everything but its pages.
+"""The report of made-up records as a reader meets it in a browser that is cut off from everything
+but its pages.
 
-Wide and narrow, light and dark, by keyboard, on paper, without script; curves, films, and the poses that films show.
-Without a browser the tests are skipped, and say so.
+Wide and narrow, light and dark, by keyboard, on paper, without script; curves, films, and the poses
+that films show. Without a browser the tests are skipped, and say so.
 """
 
 import re
@@ -33,15 +34,28 @@ pytestmark = pytest.mark.thorough
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 ARGUMENTS = (
-    "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
-    "--disable-component-update", "--disable-sync", "--enable-unsafe-swiftshader",
-)  # fmt: skip
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--enable-unsafe-swiftshader",
+)
 DESK, PHONE = (1400, 900), (400, 860)
 FIGURES = ("hero", "fig07", "fig08", "film-corner", "fig03")
 LEAST_CONTRAST = 4.5  # WCAG 2.2, level AA, text of ordinary size
 REAL = Path(__file__).parents[2] / "out" / "report.html"
 MOST_PRINTED = 7  # pages of paper for the first page: six, or one more with wide fonts
-ANSWERED = ("Tested", "✓ Holds", "✕ Fails", "✓ Energy", "Known failures", "Next step")  # one screen, two of a phone
+ANSWERED = (
+    "Tested",
+    "✓ Holds",
+    "✕ Fails",
+    "✓ Energy",
+    "Known failures",
+    "Next step",
+)  # one screen, two of a phone
 BELOW = """([texts, depth]) => texts.filter((text) => {
     const found = [...document.querySelectorAll(".first dt")]
         .find((part) => part.textContent.replace(/\\s+/g, " ").startsWith(text));
@@ -90,8 +104,10 @@ PALE = """(least) => {
     return found;
 }"""
 FOCUSED = "(names) => names.filter((name) => document.activeElement.matches(name))"
-REACHED = {"figures": {"#fig07 .legend button", "summary", ".scroll"},
-           None: {".controls button", ".controls input", ".ways a"}}  # fmt: skip
+REACHED = {
+    "figures": {"#fig07 .legend button", "summary", ".scroll"},
+    None: {".controls button", ".controls input", ".ways a"},
+}
 READ = """() => [...document.querySelector("#fig07 .readout:not([hidden])").children]
     .map((row) => [row.firstChild.textContent, row.querySelector("b").textContent])"""
 PLACE = """() => {
@@ -106,25 +122,53 @@ TO_THE_END = "(input) => { input.value = input.max; input.dispatchEvent(new Even
 @pytest.fixture(scope="module")
 def evidence():
     """Made-up records: a little of each kind, wide tables and long words among them."""
-    names = sorted({name for recipe in RECIPES if recipe.key in FIGURES for name in recipe.needs if "/" in name})
+    names = sorted(
+        {
+            name
+            for recipe in RECIPES
+            if recipe.key in FIGURES
+            for name in recipe.needs
+            if "/" in name
+        }
+    )
     runs = {name: made_motion("peg_corner", k) for k, name in enumerate(names)}
-    tilted = {tilt: {name: runs[f"corner/{name}"] for name in UNLIMITED} for tilt in (0.0, 0.015, 0.3)}
+    tilted = {
+        tilt: {name: runs[f"corner/{name}"] for name in UNLIMITED} for tilt in (0.0, 0.015, 0.3)
+    }
     table = titled(tuple(f"a long heading {k}" for k in range(12)), (("word", *range(11)),))
     return Evidence(
         inputs={**runs, TILTED: tilted, "arm_energies": arm_energies()},
-        claims=(finding_of("C01", "C01", "energy never rises", "half: $\\frac{1}{2}$",
-                           (Part("p.", MIXED, "as printed"),), {"C01": table}),),
-        topics=(finding_of("scene-ledger", "The scenes", "Asked.", "It holds.", (Part("It holds.", REPRODUCED),),
-                           {"wide": table}),),
+        claims=(
+            finding_of(
+                "C01",
+                "C01",
+                "energy never rises",
+                "half: $\\frac{1}{2}$",
+                (Part("p.", MIXED, "as printed"),),
+                {"C01": table},
+            ),
+        ),
+        topics=(
+            finding_of(
+                "scene-ledger",
+                "The scenes",
+                "Asked.",
+                "It holds.",
+                (Part("It holds.", REPRODUCED),),
+                {"wide": table},
+            ),
+        ),
         provenance={"commit": "0123456789abcdef" * 4},
-    )  # fmt: skip
+    )
 
 
 @pytest.fixture(scope="module")
 def first(evidence, tmp_path_factory):
     """The first page of the report of made-up records, with a few figures of each kind."""
     recipes = [recipe for recipe in RECIPES if recipe.key in FIGURES]
-    return write_report(tmp_path_factory.mktemp("page"), build_report(evidence, draw_all(evidence, recipes)))
+    return write_report(
+        tmp_path_factory.mktemp("page"), build_report(evidence, draw_all(evidence, recipes))
+    )
 
 
 @pytest.fixture(scope="module")
@@ -141,25 +185,36 @@ def started():
 
 
 class Sight:
-    """A page in a browser, and what it did that it should not: `errors` of its console, `requests` beside its own."""
+    """A page in a browser, and what it did that it should not: `errors` of its console, `requests`
+    beside its own."""
 
     def __init__(self, page):
         self.page, self.ask, self.errors, self.requests = page, page.evaluate, [], []
-        page.on("console", lambda said: said.type in ("error", "warning") and self.errors.append(said.text))
+        page.on(
+            "console",
+            lambda said: said.type in ("error", "warning") and self.errors.append(said.text),
+        )
         page.on("pageerror", lambda error: self.errors.append(str(error)))
 
 
 @pytest.fixture(scope="module")
 def see(started, first):
-    """Return ``see(page="figures", size=DESK, **context)``: a context manager that opens a section's page or a file.
+    """Return ``see(page="figures", size=DESK, **context)``: a context manager that opens a
+    section's page or a file.
 
     Any request of it but for another page of the report is refused and remembered.
     """
+
     @contextmanager
     def opened(page="figures", size=DESK, **context):
         path = page if isinstance(page, Path) else first.parent / "report" / f"{page}.html"
-        pages = {page.resolve().as_uri() for page in path.parents[path.parent.name == "report"].rglob("*.html")}
-        room = started.new_context(viewport={"width": size[0], "height": size[1]}, offline=True, **context)
+        pages = {
+            page.resolve().as_uri()
+            for page in path.parents[path.parent.name == "report"].rglob("*.html")
+        }
+        room = started.new_context(
+            viewport={"width": size[0], "height": size[1]}, offline=True, **context
+        )
         sight = Sight(room.new_page())
 
         def judge(route):
@@ -190,7 +245,9 @@ def pages_of(first):
 
 @pytest.mark.parametrize("size", [DESK, PHONE], ids=["desk", "phone"])
 @pytest.mark.parametrize("report", ["made up", "here"])
-def test_each_page_is_whole_and_the_first_screens_of_the_report_that_is_here_answer(see, first, report, size):
+def test_each_page_is_whole_and_the_first_screens_of_the_report_that_is_here_answer(
+    see, first, report, size
+):
     if report == "here" and not REAL.is_file():
         pytest.skip("no out/report.html here; `make reproduce` makes one")
     figures, given = 0, first if report == "made up" else REAL
@@ -201,8 +258,15 @@ def test_each_page_is_whole_and_the_first_screens_of_the_report_that_is_here_ans
             assert sight.ask(OUT_OF_SIGHT) == sight.ask(CLIPPED) == [] and sight.ask(OVERFLOW) <= 0
             figures += sight.ask("() => document.querySelectorAll('figure').length")
         sight.page.goto(given.as_uri())
-        assert figures == 6 or given == REAL and sight.ask(BELOW, [ANSWERED, (1 + (size == PHONE)) * size[1]]) == []
-        assert given == first or len(re.findall(rb"/Type\s*/Page[^s]", sight.page.pdf(format="A4"))) <= MOST_PRINTED
+        assert (
+            figures == 6
+            or given == REAL
+            and sight.ask(BELOW, [ANSWERED, (1 + (size == PHONE)) * size[1]]) == []
+        )
+        assert (
+            given == first
+            or len(re.findall(rb"/Type\s*/Page[^s]", sight.page.pdf(format="A4"))) <= MOST_PRINTED
+        )
 
 
 def test_the_checks_see_a_page_that_is_not_whole(desk):
@@ -214,7 +278,11 @@ def test_the_checks_see_a_page_that_is_not_whole(desk):
         document.body.append(Object.assign(new Image(), { src: "https://example.org/a.png" }));
     }""")
     desk.page.wait_for_timeout(100)
-    assert len(desk.ask(OUT_OF_SIGHT)) == 1 and desk.ask(OVERFLOW) > 1000 and desk.ask(CLIPPED) == ["wide"]
+    assert (
+        len(desk.ask(OUT_OF_SIGHT)) == 1
+        and desk.ask(OVERFLOW) > 1000
+        and desk.ask(CLIPPED) == ["wide"]
+    )
     assert "H3." in desk.ask(PALE, LEAST_CONTRAST)
     assert desk.errors != []  # the page's own policy refused the picture, before any request
 
@@ -224,14 +292,19 @@ def test_all_text_can_be_read(see, first, scheme):
     with see(color_scheme=scheme) as sight:
         for path in pages_of(first):
             sight.page.goto(path.as_uri())
-            sight.ask("() => document.querySelectorAll('details').forEach((part) => { part.open = true; })")
+            sight.ask(
+                "() => document.querySelectorAll('details').forEach((part) => { part.open = true; })"
+            )
             assert sight.ask(PALE, LEAST_CONTRAST) == {}
 
 
 def test_without_script_the_content_is_there(see, first):
     with see(size=PHONE, java_script_enabled=False) as sight:
         page = sight.page
-        assert page.locator("figure").count() == 3 and page.locator("#fig07 [data-curve] path").count() > 0
+        assert (
+            page.locator("figure").count() == 3
+            and page.locator("#fig07 [data-curve] path").count() > 0
+        )
         assert page.locator("button:visible, input:visible").count() == 0 and sight.errors == []
     with see(first, PHONE, java_script_enabled=False) as sight:
         assert sight.page.locator("#film-corner svg animateTransform").count() == 4 * 2
@@ -242,7 +315,9 @@ def test_without_script_the_content_is_there(see, first):
 @pytest.mark.parametrize("name", REACHED)
 def test_the_keyboard_reaches_everything(see, first, name):
     with see(name or first) as sight:
-        sight.ask("() => document.querySelectorAll('#fig07 details').forEach((part) => { part.open = true; })")
+        sight.ask(
+            "() => document.querySelectorAll('#fig07 details').forEach((part) => { part.open = true; })"
+        )
         sight.page.keyboard.press("Tab")
         assert sight.ask("() => document.activeElement.className") == "skip"
         reached = set()
@@ -284,7 +359,8 @@ def test_a_world_can_be_hidden_and_shown(desk):
 
 
 def test_the_cursor_reads_the_values_of_the_run(desk, evidence):
-    """To within what the drawing keeps: 0.02 of its 180 points of height; the cursor stands between two steps."""
+    """To within what the drawing keeps: 0.02 of its 180 points of height; the cursor stands between
+    two steps."""
     plot = desk.page.locator("#fig07 svg[data-trace=time]").first
     plot.scroll_into_view_if_needed()
     box = plot.bounding_box()
@@ -296,7 +372,9 @@ def test_the_cursor_reads_the_values_of_the_run(desk, evidence):
     kept = np.ptp(x) * 0.02 / 180
     assert near.min() - kept <= float(rows["ideal"]) <= near.max() + kept
     assert np.ptp(near) < np.ptp(x) / 10  # or the bracket would say nothing
-    assert desk.page.locator("#fig07 .readout:visible").count() == 5  # the panels over time read together
+    assert (
+        desk.page.locator("#fig07 .readout:visible").count() == 5
+    )  # the panels over time read together
 
 
 def test_the_slider_shows_one_tilt_at_a_time(see, first):
@@ -305,17 +383,23 @@ def test_the_slider_shows_one_tilt_at_a_time(see, first):
     with see(first) as desk:
         assert desk.ask(shown) == ["1", "1"]  # the tilt of the scene, in both pictures
         desk.page.locator("#hero input[type=range]").evaluate(TO_THE_END)
-        assert desk.ask(shown) == ["2", "2"] and desk.page.locator("#hero text", has_text="Tilt 17.19°").is_visible()
+        assert (
+            desk.ask(shown) == ["2", "2"]
+            and desk.page.locator("#hero text", has_text="Tilt 17.19°").is_visible()
+        )
 
 
 def test_a_film_plays_stops_and_shows_the_poses_of_the_run(see, first, evidence):
-    """It begins shortly before the first contact; at the end, the corners of the peg are where the run has them."""
+    """It begins shortly before the first contact; at the end, the corners of the peg are where the
+    run has them."""
     runs = [evidence.inputs[name] for name in UNLIMITED.values()]
     touched = min(run.time[np.flatnonzero(np.diff(run.contacts.offsets))[0]] for run in runs)
     with see(first) as desk:
         player, start = desk.page.locator("#film-corner"), desk.ask(PLACE)
         button, slider = player.locator(".controls button"), player.locator("input[type=range]")
-        assert 0.0 < touched - 0.031 <= float(slider.input_value()) <= touched - 0.03 + 5 * runs[0].dt
+        assert (
+            0.0 < touched - 0.031 <= float(slider.input_value()) <= touched - 0.03 + 5 * runs[0].dt
+        )
         button.click()
         desk.page.wait_for_function(MOVED, arg=start)
         button.click()
@@ -332,11 +416,24 @@ def test_a_film_plays_stops_and_shows_the_poses_of_the_run(see, first, evidence)
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     expected = made.flat(corners @ turn.T + [x, y])
     local = np.array([list(map(float, pair.split())) for pair in drawn.strip("Mz").split("L")])
-    np.testing.assert_allclose(local @ [[a, b], [c, d]] + [e, f], expected, atol=0.3)  # of 400 units of the picture
+    np.testing.assert_allclose(
+        local @ [[a, b], [c, d]] + [e, f], expected, atol=0.3
+    )  # of 400 units of the picture
 
 
-def test_the_mouse_pulls_the_peg_out_of_the_corner_and_closing_the_page_stores_the_run(started, tmp_path):
-    command = [sys.executable, "-m", "reports.cli", "view", "peg_corner", "--no-browser", "--out", str(tmp_path)]
+def test_the_mouse_pulls_the_peg_out_of_the_corner_and_closing_the_page_stores_the_run(
+    started, tmp_path
+):
+    command = [
+        sys.executable,
+        "-m",
+        "reports.cli",
+        "view",
+        "peg_corner",
+        "--no-browser",
+        "--out",
+        str(tmp_path),
+    ]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
         address = next(line.split()[1] for line in process.stderr if line.startswith("Open "))
         page = started.new_page(viewport={"width": 800, "height": 560})

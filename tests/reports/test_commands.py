@@ -1,4 +1,5 @@
-"""The command line, in process: what it refuses, and each command once, from its words to its answer and its files."""
+"""The command line, in process: what it refuses, and each command once, from its words to its
+answer and its files."""
 
 import json
 import os
@@ -66,11 +67,21 @@ def here(tmp_path, monkeypatch):
     """Work in a folder with files that are not what they seem."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "bare").mkdir(), (tmp_path / "given").mkdir()
-    for name, text in {"wrong.yaml": WRONG_SCENE, "ball.yaml": "", "notes.h5": "not HDF5", "notes.md": "notes",
-                       "text.npz": "no archive", "empty.npz": "", "own_number.py": "f = 3",
-                       "own_syntax.py": "def f(:", "own_fault.py": "f = 1 / 0", "two.yaml": STUDY,
-                       "given/two.lcp": "2\n2 1\n1 2\n-5 -6\n", "given/bad.lcp": "2\nno number\n",
-                       "given/none.lcp": "1\n-1\n-1\n"}.items():  # fmt: skip
+    for name, text in {
+        "wrong.yaml": WRONG_SCENE,
+        "ball.yaml": "",
+        "notes.h5": "not HDF5",
+        "notes.md": "notes",
+        "text.npz": "no archive",
+        "empty.npz": "",
+        "own_number.py": "f = 3",
+        "own_syntax.py": "def f(:",
+        "own_fault.py": "f = 1 / 0",
+        "two.yaml": STUDY,
+        "given/two.lcp": "2\n2 1\n1 2\n-5 -6\n",
+        "given/bad.lcp": "2\nno number\n",
+        "given/none.lcp": "1\n-1\n-1\n",
+    }.items():
         (tmp_path / name).write_text(text)
     np.savez(tmp_path / "half.npz", v_minus=np.ones((1, 2)))
     (tmp_path / "cut.npz").write_bytes((tmp_path / "half.npz").read_bytes()[:99])
@@ -91,72 +102,133 @@ def archive(path, gain=False):
 
 def listed(command):
     """The keys that the documents list for a command: the words before what stands in brackets."""
-    [row] = re.findall(rf"^\| `{command}` \| (.*) \|$", (ROOT / "docs" / "report.md").read_text("utf-8"), re.M)
+    [row] = re.findall(
+        rf"^\| `{command}` \| (.*) \|$", (ROOT / "docs" / "report.md").read_text("utf-8"), re.M
+    )
     return {key.strip() for key in re.sub(r"\([^)]*\)|;.*", "", row).split(",")}
 
 
 REFUSED = [  # status, command line, what the refusal says
-    (2, "walk", "Usage"), (2, "run", "Usage"), (2, "", "Usage"), (2, "run peg_corner --speed 3", "No such option"),
-    (2, "inspect", "Usage"), (2, "inspect run.h5 --impacts -3", "--impacts"), (2, "verify --seed -1", "--seed"),
+    (2, "walk", "Usage"),
+    (2, "run", "Usage"),
+    (2, "", "Usage"),
+    (2, "run peg_corner --speed 3", "No such option"),
+    (2, "inspect", "Usage"),
+    (2, "inspect run.h5 --impacts -3", "--impacts"),
+    (2, "verify --seed -1", "--seed"),
     (2, "verify --laws restitution --full", "not with --full"),
     (2, "sweep corner_tilt --workers 99999999", "--workers"),
-    (2, "compare --worlds PB", "give a SCENE"), (2, "compare --against PB", "give a SCENE"),
-    (2, "compare --only-problems", "--problems"), (2, "store check . --delete", "only with the action gc"),
-    (1, "run wrong.yaml", "wrong.yaml:2:"), (1, "run wrong.yaml", "bodies[0].joint"),
-    (1, "effects wrong.yaml", "wrong.yaml:6:"), (1, "effects wrong.yaml", "contact.stiffness"),
-    (1, "run no_such_scene", "no_such_scene"), (1, "run peg_cornr", "did you mean peg_corner?"),
-    (1, "run bal.yaml", "did you mean ball.yaml?"), (1, "run scenes/peg_cornr.yaml", "did you mean peg_corner?"),
+    (2, "compare --worlds PB", "give a SCENE"),
+    (2, "compare --against PB", "give a SCENE"),
+    (2, "compare --only-problems", "--problems"),
+    (2, "store check . --delete", "only with the action gc"),
+    (1, "run wrong.yaml", "wrong.yaml:2:"),
+    (1, "run wrong.yaml", "bodies[0].joint"),
+    (1, "effects wrong.yaml", "wrong.yaml:6:"),
+    (1, "effects wrong.yaml", "contact.stiffness"),
+    (1, "run no_such_scene", "no_such_scene"),
+    (1, "run peg_cornr", "did you mean peg_corner?"),
+    (1, "run bal.yaml", "did you mean ball.yaml?"),
+    (1, "run scenes/peg_cornr.yaml", "did you mean peg_corner?"),
     (1, "run peg_corner --world best", "world = 'best': expected one of IAPB, PB, "),
-    (1, "run peg_corner --world iapb", "did you mean IAPB?"), (1, "run peg_corner --rendering clip", "'clip'"),
+    (1, "run peg_corner --world iapb", "did you mean IAPB?"),
+    (1, "run peg_corner --rendering clip", "'clip'"),
     (1, "run peg_corner --world PB --rendering spread", "rendering = 'spread'"),
     (1, "run peg_corner --set friction", "--set = 'friction': expected path=value"),
     (1, "run peg_corner --set contact.friction=-1", "contact.friction"),
-    (1, "run peg_corner --set contact.frictoin=1", "frictoin"), (1, "run peg_corner --set mass=[1", "--set"),
+    (1, "run peg_corner --set contact.frictoin=1", "frictoin"),
+    (1, "run peg_corner --set mass=[1", "--set"),
     (1, "run peg_corner --set bodies.pegg.mass=1", "did you mean peg?"),
     (1, "run peg_corner --out ''", "--out = '': expected a value that is not empty"),
-    (1, "run peg_corner --out=", "--out = '': expected"), (1, "run ''", "argument 2 = '': expected a value"),
+    (1, "run peg_corner --out=", "--out = '': expected"),
+    (1, "run ''", "argument 2 = '': expected a value"),
     (1, "run peg_corner --out /dev/null/folder", "/dev/null/folder: "),
-    (1, "inspect no_such_file.h5", "no_such_file.h5: no such file"), (1, "inspect .", ".: a folder, not a file"),
-    (1, "inspect notes.h5", "notes.h5"), (1, "store check ''", "argument 3 = ''"),
+    (1, "inspect no_such_file.h5", "no_such_file.h5: no such file"),
+    (1, "inspect .", ".: a folder, not a file"),
+    (1, "inspect notes.h5", "notes.h5"),
+    (1, "store check ''", "argument 3 = ''"),
     *((1, f"store {action} /", "not a whole file system") for action in ("check", "again")),
     *((1, f"certify {name}.npz", "no archive") for name in ("text", "empty", "cut")),
-    (1, "certify half.npz", "mass_matrix, v_plus missing"), (1, "certify whole.npz absent.npz --export hard", "absent"),
-    *((1, f"certify whole.npz --export {name}", "--export") for name in ("whole.npz", "link.out", "hard.out", ".")),
+    (1, "certify half.npz", "mass_matrix, v_plus missing"),
+    (1, "certify whole.npz absent.npz --export hard", "absent"),
+    *(
+        (1, f"certify whole.npz --export {name}", "--export")
+        for name in ("whole.npz", "link.out", "hard.out", ".")
+    ),
     (1, "compare --only-problems --problems bare", "a folder with problem files"),
-    (1, "compare peg_corner --worlds ideel", "did you mean ideal?"), (1, "compare --out x.csv", "ends in .json"),
-    (1, "compare peg_corner --against best", "against = 'best'"), (1, "sweep corner_tlt", "did you mean corner_tilt?"),
-    (1, "prove no_such_statement", "no_such_statement"), (1, "prove theorem1", "did you mean theorem_1?"),
-    (1, "reproduce --figure fig7", "did you mean fig07?"), (1, "report diff here there", "report = 'here'"),
+    (1, "compare peg_corner --worlds ideel", "did you mean ideal?"),
+    (1, "compare --out x.csv", "ends in .json"),
+    (1, "compare peg_corner --against best", "against = 'best'"),
+    (1, "sweep corner_tlt", "did you mean corner_tilt?"),
+    (1, "prove no_such_statement", "no_such_statement"),
+    (1, "prove theorem1", "did you mean theorem_1?"),
+    (1, "reproduce --figure fig7", "did you mean fig07?"),
+    (1, "report diff here there", "report = 'here'"),
     (1, "bench --budget 50", "budget = '50': expected a time with its unit, e.g. 50us"),
-    (1, "effects peg_corner --measure --world ideal", "--measure needs a world of the compiled engine"),
-    (1, "verify --resolver nothing", "package.module:function"), (1, "verify --resolver no_such:f", "can be imported"),
-    (1, "verify --resolver json:dumps", "resolver = 'dumps': expected a function called as (mass_matrix, con"),
-    (1, "verify --resolver iapb:resolve_impct", "which has no resolve_impct; did you mean resolve_impact?"),
-    *((1, f"verify --resolver {name}", said) for name, said in (
-        ("omega", "resolver = 'omega'"), (":f", "resolver = ':f'"), ("json:", "resolver = 'json:'"),
-        (".relative:f", "resolver"), ("'a b:c'", "resolver"), ("own_syntax:f", "SyntaxError"),
-        ("own_fault:f", "ZeroDivisionError"), ("own_number:f", "something that can be called"))),
-]  # fmt: skip
+    (
+        1,
+        "effects peg_corner --measure --world ideal",
+        "--measure needs a world of the compiled engine",
+    ),
+    (1, "verify --resolver nothing", "package.module:function"),
+    (1, "verify --resolver no_such:f", "can be imported"),
+    (
+        1,
+        "verify --resolver json:dumps",
+        "resolver = 'dumps': expected a function called as (mass_matrix, con",
+    ),
+    (
+        1,
+        "verify --resolver iapb:resolve_impct",
+        "which has no resolve_impct; did you mean resolve_impact?",
+    ),
+    *(
+        (1, f"verify --resolver {name}", said)
+        for name, said in (
+            ("omega", "resolver = 'omega'"),
+            (":f", "resolver = ':f'"),
+            ("json:", "resolver = 'json:'"),
+            (".relative:f", "resolver"),
+            ("'a b:c'", "resolver"),
+            ("own_syntax:f", "SyntaxError"),
+            ("own_fault:f", "ZeroDivisionError"),
+            ("own_number:f", "something that can be called"),
+        )
+    ),
+]
 
 
-@pytest.mark.parametrize(("status", "words", "said"), REFUSED, ids=lambda value: str(value) or "nothing")
-def test_a_refusal_names_the_value_and_what_is_expected_and_changes_no_file(status, words, said, iapb, here):
+@pytest.mark.parametrize(
+    ("status", "words", "said"), REFUSED, ids=lambda value: str(value) or "nothing"
+)
+def test_a_refusal_names_the_value_and_what_is_expected_and_changes_no_file(
+    status, words, said, iapb, here
+):
     before = {path: path.read_bytes() for path in here.rglob("*") if path.is_file()}
     ended, out, err = iapb(*shlex.split(words))
-    assert ended == status and said in " ".join((out + err).split()) and "Traceback" not in out + err
+    assert (
+        ended == status and said in " ".join((out + err).split()) and "Traceback" not in out + err
+    )
     assert "\niapb: " in f"\n{err}" if status == 1 else "Usage" in out + err
-    assert before == {path: path.read_bytes() for path in here.rglob("*")
-                      if path.is_file() and "__pycache__" not in path.parts}  # fmt: skip
+    assert before == {
+        path: path.read_bytes()
+        for path in here.rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts
+    }
 
 
 JSON = {  # of each row in the documents: the status, and a command
     "run": (0, "run peg_corner --set duration=0.4 --out runs"),
-    "check": (3, "check peg_corner --set contact.stiffness=1e9"), "effects": (0, "effects peg_corner --world ideal"),
-    "certify": (0, "certify runs whole.npz"), "store again": (0, "store again runs"),
-    "sweep": (0, "sweep two.yaml --workers 1 --out sweeps"), "compare": (0, "compare --only-problems --problems given"),
-    "verify": (0, "verify --impacts 20 --laws kinetic_energy"), "prove": (0, "prove theorem_1"),
+    "check": (3, "check peg_corner --set contact.stiffness=1e9"),
+    "effects": (0, "effects peg_corner --world ideal"),
+    "certify": (0, "certify runs whole.npz"),
+    "store again": (0, "store again runs"),
+    "sweep": (0, "sweep two.yaml --workers 1 --out sweeps"),
+    "compare": (0, "compare --only-problems --problems given"),
+    "verify": (0, "verify --impacts 20 --laws kinetic_energy"),
+    "prove": (0, "prove theorem_1"),
     "reproduce --figure": (0, "reproduce --figure fig02 --out figures"),
-}  # fmt: skip
+}
 
 
 def test_json_has_the_keys_that_the_documents_list_and_an_error_is_an_object_too(answer, here):
@@ -168,7 +240,10 @@ def test_json_has_the_keys_that_the_documents_list_and_an_error_is_an_object_too
     assert len(seen["impacts"]) == min(2, seen["collisions"])
     assert (seen["end"], seen["steps"]) == (ran["end"], ran["steps"])
     assert {"energy", "effects", "provenance", "run_key", "content_hash"} <= set(seen)
-    assert found["check"]["limits"]["contacts"] == 2 and found["check"]["warnings"][0]["kind"] == "stiffness"
+    assert (
+        found["check"]["limits"]["contacts"] == 2
+        and found["check"]["warnings"][0]["kind"] == "stiffness"
+    )
     assert found["check"]["warnings"][0].keys() == {"kind", "where", "text"}
     ignored = {one["name"]: one["ignores"] for one in found["effects"]["effects"]}
     assert ignored["penalty_stiffness"] == "stiffness"
@@ -177,8 +252,12 @@ def test_json_has_the_keys_that_the_documents_list_and_an_error_is_an_object_too
     assert (Path(found["sweep"]["folder"]) / "points.nc").is_file()
     rows = {row[0]: row for row in found["compare"]["tables"]["given"]["rows"]}
     assert set(found["compare"]["tables"]) == {"given", "profile"} and "not read" in rows["bad.lcp"]
-    assert rows["two.lcp"].count("solved") > 3 and "solved" not in rows["none.lcp"]  # no z has 0 <= z and -z - 1 >= 0
-    assert found["verify"]["passed"] and [one["law"] for one in found["verify"]["laws"]] == ["kinetic_energy"]
+    assert (
+        rows["two.lcp"].count("solved") > 3 and "solved" not in rows["none.lcp"]
+    )  # no z has 0 <= z and -z - 1 >= 0
+    assert found["verify"]["passed"] and [one["law"] for one in found["verify"]["laws"]] == [
+        "kinetic_energy"
+    ]
     assert [one["verdict"] for one in found["prove"]["statements"]] == ["proved"]
     drawings = found["reproduce --figure"]["drawings"]
     assert drawings and all(Path(each).is_file() for each in drawings)
@@ -186,13 +265,18 @@ def test_json_has_the_keys_that_the_documents_list_and_an_error_is_an_object_too
     os.truncate(ran["file"], 5000)
     assert (status, set(whole), whole["count"]) == (0, {"files", "count"}, {"whole": 1})
     assert answer("store", "check", "runs")[1]["count"] == {"damaged": 1}
-    for status, line, said in ((1, "run no_such_scene", "no_such_scene"), (2, "run", "scene"),
-                               (2, "run peg_corner --speed 3", "No such option")):  # fmt: skip
+    for status, line, said in (
+        (1, "run no_such_scene", "no_such_scene"),
+        (2, "run", "scene"),
+        (2, "run peg_corner --speed 3", "No such option"),
+    ):
         ended, error = answer(*line.split())
         assert ended == error["status"] == status and said in error["error"]
 
 
-def test_debug_shows_the_traceback_ctrl_c_ends_with_130_and_a_fault_of_ours_is_not_hidden(iapb, here, monkeypatch):
+def test_debug_shows_the_traceback_ctrl_c_ends_with_130_and_a_fault_of_ours_is_not_hidden(
+    iapb, here, monkeypatch
+):
     with pytest.raises(SceneError):
         cli.main(["--debug", "run", "wrong.yaml"])
     raised = [KeyboardInterrupt, ZeroDivisionError]
@@ -207,16 +291,33 @@ def test_debug_shows_the_traceback_ctrl_c_ends_with_130_and_a_fault_of_ours_is_n
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("of_ctrl_c", [signal.SIG_DFL, signal.SIG_IGN], ids=["in front", "in the background"])
+@pytest.mark.parametrize(
+    "of_ctrl_c", [signal.SIG_DFL, signal.SIG_IGN], ids=["in front", "in the background"]
+)
 def test_the_signal_that_ends_a_process_politely_keeps_what_was_done(of_ctrl_c, tmp_path):
-    command = [sys.executable, "-m", "reports.cli", "run", "peg_corner", "--world", "ideal", "--set", "duration=600",
-               "--out", str(tmp_path)]  # fmt: skip
+    command = [
+        sys.executable,
+        "-m",
+        "reports.cli",
+        "run",
+        "peg_corner",
+        "--world",
+        "ideal",
+        "--set",
+        "duration=600",
+        "--out",
+        str(tmp_path),
+    ]
     start = partial(signal.signal, signal.SIGINT, of_ctrl_c)
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, preexec_fn=start) as process:
         time.sleep(LOADED)
         process.terminate()
         out, _ = process.communicate(timeout=60)
-    assert process.returncode == 130 and "Stopped: interrupted" in out and len(list(tmp_path.glob("*.partial"))) == 1
+    assert (
+        process.returncode == 130
+        and "Stopped: interrupted" in out
+        and len(list(tmp_path.glob("*.partial"))) == 1
+    )
 
 
 def test_every_command_explains_itself_in_the_words_of_the_list(iapb):
@@ -224,7 +325,12 @@ def test_every_command_explains_itself_in_the_words_of_the_list(iapb):
     for command, words in cli.COMMANDS.items():
         status, out, _ = iapb(command, "--help")
         explained = getattr(import_module(f"reports.commands.{command}"), command).__doc__
-        assert status == 0 and "Usage" in out and explained.partition("\n")[0] == words and command in told
+        assert (
+            status == 0
+            and "Usage" in out
+            and explained.partition("\n")[0] == words
+            and command in told
+        )
 
 
 def test_version_scenes_schema_and_completion(iapb, answer, monkeypatch, capsys):
@@ -233,8 +339,11 @@ def test_version_scenes_schema_and_completion(iapb, answer, monkeypatch, capsys)
     parts = json.loads(iapb("schema")[1])["$defs"]
     assert all("bodies" in parts[kind]["properties"] for kind in ("Scene", "SpatialScene"))
     monkeypatch.setenv("_IAPB_COMPLETE", "complete_bash")
-    for words, place, expected in (("iapb run peg_c", 2, "peg_corner"), ("iapb che", 1, "check"),
-                                   ("iapb run --wor", 2, "--world")):
+    for words, place, expected in (
+        ("iapb run peg_c", 2, "peg_corner"),
+        ("iapb che", 1, "check"),
+        ("iapb run --wor", 2, "--world"),
+    ):
         monkeypatch.setenv("COMP_WORDS", words)
         monkeypatch.setenv("COMP_CWORD", str(place))
         with pytest.raises(SystemExit, match="0"):  # typer ends the process that a shell asks
@@ -247,16 +356,29 @@ def test_run_stores_a_run_a_second_call_reads_it_and_inspect_tells_what_is_in_it
     [file] = tmp_path.glob("*.h5")
     written = file.stat().st_mtime_ns
     assert status == 0 and "computed in" in out and str(file) in out
-    assert "read from its file" in iapb("run", *SHORT, "--out", tmp_path)[1] and file.stat().st_mtime_ns == written
+    assert (
+        "read from its file" in iapb("run", *SHORT, "--out", tmp_path)[1]
+        and file.stat().st_mtime_ns == written
+    )
     for more in (("--set", "contact.stiffness=900"), ("--world", "PB"), ("--rendering", "spread")):
         iapb("run", *SHORT, *more, "--out", tmp_path)
     assert len(list(tmp_path.glob("*.h5"))) == 4
     status, out, _ = iapb("inspect", file, "--impacts", "1")
-    for text in ("peg_corner", "Complete.", "The first 1 of", "impact_loss", "friction", "run key", "content hash"):
+    for text in (
+        "peg_corner",
+        "Complete.",
+        "The first 1 of",
+        "impact_loss",
+        "friction",
+        "run key",
+        "content hash",
+    ):
         assert status == 0 and text in out, text
 
 
-def test_a_run_that_is_interrupted_diverges_or_is_not_to_be_trusted_says_so(iapb, answer, tmp_path, monkeypatch):
+def test_a_run_that_is_interrupted_diverges_or_is_not_to_be_trusted_says_so(
+    iapb, answer, tmp_path, monkeypatch
+):
     @contextmanager
     def interrupting(*_, **__):
         def progress(*_):
@@ -267,32 +389,101 @@ def test_a_run_that_is_interrupted_diverges_or_is_not_to_be_trusted_says_so(iapb
     monkeypatch.setattr("reports.commands.run.stage_progress", interrupting)
     status, out, err = iapb("run", "peg_corner", "--out", tmp_path)
     [file] = tmp_path.glob("*.partial")
-    assert status == 130 and str(file) in out and "Stopped: interrupted" in out and "Traceback" not in err
+    assert (
+        status == 130
+        and str(file) in out
+        and "Stopped: interrupted" in out
+        and "Traceback" not in err
+    )
     assert not list(tmp_path.glob("*.h5")) and "Partial: interrupted." in iapb("inspect", file)[1]
     monkeypatch.undo()
-    assert iapb("run", "peg_corner", "--out", tmp_path)[0] == 0  # done from the start, and the partial file is gone
+    assert (
+        iapb("run", "peg_corner", "--out", tmp_path)[0] == 0
+    )  # done from the start, and the partial file is gone
     assert len(list(tmp_path.glob("*.h5"))) == 1 and not list(tmp_path.glob("*.partial"))
-    walls = [{"name": f"wall_{n}", "kind": "half_plane", "point": [0.05 * n, 0], "normal": [-n, 0]} for n in (1, -1)]
-    status, out, _ = iapb("run", "peg_corner", "--world", "PB", "--set", "contact.stiffness=1e9", "--set",
-                          "contact.damping=0", "--set", f"walls={json.dumps(walls)}", "--out", tmp_path)  # fmt: skip
+    walls = [
+        {"name": f"wall_{n}", "kind": "half_plane", "point": [0.05 * n, 0], "normal": [-n, 0]}
+        for n in (1, -1)
+    ]
+    status, out, _ = iapb(
+        "run",
+        "peg_corner",
+        "--world",
+        "PB",
+        "--set",
+        "contact.stiffness=1e9",
+        "--set",
+        "contact.damping=0",
+        "--set",
+        f"walls={json.dumps(walls)}",
+        "--out",
+        tmp_path,
+    )
     assert status == 1 and "Stopped: the" in out and "range of numbers" in out
-    wrong = ("run", "peg_corner", "--set", "duration=0.5", "--set", "contact.stiffness=1e8", "--out", tmp_path / "x")
+    wrong = (
+        "run",
+        "peg_corner",
+        "--set",
+        "duration=0.5",
+        "--set",
+        "contact.stiffness=1e8",
+        "--out",
+        tmp_path / "x",
+    )
     status, out, err = iapb(*wrong)
-    assert status == 3 and "Warning: contact.stiffness" in err and "not to be trusted, because its energy is" in out
-    assert answer(*wrong)[1]["distrust"] and "not to be trusted" in iapb("inspect", *tmp_path.glob("x/*.h5"))[1]
+    assert (
+        status == 3
+        and "Warning: contact.stiffness" in err
+        and "not to be trusted, because its energy is" in out
+    )
+    assert (
+        answer(*wrong)[1]["distrust"]
+        and "not to be trusted" in iapb("inspect", *tmp_path.glob("x/*.h5"))[1]
+    )
 
 
 def test_check_says_what_the_step_holds_and_what_a_rigid_world_costs(iapb, answer):
     status, out, _ = iapb("check", "peg_corner")
-    assert status == 0 and "the step holds contact.stiffness <= 2.62e+05 N/m" in out and "Nothing wrong" in out
-    many = [{"name": f"b{i}", "joint": "planar", "mass": 1.0, "inertia": 1e-3, "position": [0.11 * i, 0.05, 0.0],
-             "shapes": [{"kind": "circle", "radius": 0.05}]} for i in range(330)]  # fmt: skip
-    base = ("wall_1d", "--set", "hand=null", "--set", "device=null", "--set", "couplings={}", "--set", "walls=[]")
+    assert (
+        status == 0
+        and "the step holds contact.stiffness <= 2.62e+05 N/m" in out
+        and "Nothing wrong" in out
+    )
+    many = [
+        {
+            "name": f"b{i}",
+            "joint": "planar",
+            "mass": 1.0,
+            "inertia": 1e-3,
+            "position": [0.11 * i, 0.05, 0.0],
+            "shapes": [{"kind": "circle", "radius": 0.05}],
+        }
+        for i in range(330)
+    ]
+    base = (
+        "wall_1d",
+        "--set",
+        "hand=null",
+        "--set",
+        "device=null",
+        "--set",
+        "couplings={}",
+        "--set",
+        "walls=[]",
+    )
     some = (*base, "--set", f"bodies={json.dumps(many[:60])}", "--set", "duration=10")
     remarks = answer("check", *some, "--world", "ideal")[1]["remarks"]
     assert any("1,770 contacts of 180 coordinates in each step, about" in said for said in remarks)
     assert not answer("check", *some)[1]["remarks"]
-    every = (*base, "--set", f"bodies={json.dumps(many)}", "--set", "duration=0.01", "--world", "ideal")
+    every = (
+        *base,
+        "--set",
+        f"bodies={json.dumps(many)}",
+        "--set",
+        "duration=0.01",
+        "--world",
+        "ideal",
+    )
     status, found = answer("check", *every)
     assert status == 3 and "size" in {one["kind"] for one in found["warnings"]}
     assert iapb("run", *every, "--out", "/nonexistent")[0] == 1
@@ -309,18 +500,30 @@ def test_certify_judges_runs_and_archives_and_exports_them_as_integers(iapb, ans
     assert "Impact 1 of" in out and "Fraction" in out
     np.savez("other.npz", mass_matrix=[[1.0]], v_minus=[[1.5]], v_plus=[[-1.5]])
     status, found = answer("certify", "runs", "other.npz", "other.npz", "--export", "impacts.txt")
-    assert status == 0 and found["passed"] and len(found["files"]) == 2  # what is named twice is judged once
+    assert (
+        status == 0 and found["passed"] and len(found["files"]) == 2
+    )  # what is named twice is judged once
     head, *impacts, end = whole = Path("impacts.txt").read_text(encoding="utf-8").splitlines()
     run = read_run(next(here.glob("runs/*.h5")))
-    assert head == "iapb impacts 2" and len(impacts) == len(run.impacts.step) + 1 > 1 and end == f"end {len(impacts)}"
+    assert (
+        head == "iapb impacts 2"
+        and len(impacts) == len(run.impacts.step) + 1 > 1
+        and end == f"end {len(impacts)}"
+    )
     size, *numbers = map(float, impacts[-1].split())
-    assert size == 1.0 and [m * 2.0**e for m, e in zip(numbers[::2], numbers[1::2], strict=True)] == [1.0, 1.5, -1.5]
+    assert size == 1.0 and [
+        m * 2.0**e for m, e in zip(numbers[::2], numbers[1::2], strict=True)
+    ] == [1.0, 1.5, -1.5]
     d, *numbers = map(int, impacts[0].split())
-    after = [np.ldexp(float(m), e) for m, e in zip(numbers[-2 * d::2], numbers[-2 * d + 1::2], strict=True)]
+    after = [
+        np.ldexp(float(m), e)
+        for m, e in zip(numbers[-2 * d :: 2], numbers[-2 * d + 1 :: 2], strict=True)
+    ]
     assert after == run.impacts.v_plus[0].tolist()
     assert iapb("certify", "other.npz", "absent.npz", "--export", "impacts.txt")[0] == 1
-    assert Path("impacts.txt").read_text(encoding="utf-8").splitlines() == whole and not list(here.glob(".*"))
-
+    assert Path("impacts.txt").read_text(encoding="utf-8").splitlines() == whole and not list(
+        here.glob(".*")
+    )
 
 
 def standing_still(mass_matrix, contact_jacobian, velocity, restitution):
@@ -334,32 +537,52 @@ def test_verify_tells_the_counterexamples_of_a_resolver(answer, monkeypatch):
     status, found = answer(*full, "--resolver", "tests.reports.test_commands:standing_still")
     assert status == 1 and not found["passed"] and set(found) == listed("verify --full")
     assert {one["law"]: one["failures"] > 0 for one in found["laws"]["impacts"]}["restitution"]
-    assert "def test_restitution" in {one["law"]: one["test"] for one in found["counterexamples"]}["restitution"]
+    assert (
+        "def test_restitution"
+        in {one["law"]: one["test"] for one in found["counterexamples"]}["restitution"]
+    )
 
 
 def test_bench_names_a_method_for_a_budget_and_prints_its_tables(iapb, answer, monkeypatch):
     choice = Choice(5e-5, 4, 3, "factored", "all rows", "compiled", 1e-6, 1e-16, 1e-15, 1.0, 1.0)
     tables, asked = {"one": Table((Column("x"),), ((1,),))}, []
     finding = Finding("cost", "t", "q", "a", REPRODUCED, (Part("s", REPRODUCED),), tables)
-    for name, stand_in in (("which_method", lambda *given: asked.append(given) or (choice,)),
-                           ("haptic_study", lambda *_: with_failures(finding, [FAILED])),
-                           ("choices", lambda _: Table(())),
-                           ("work_precision", lambda **_: Table((Column("y"),), ((2,),)))):
+    for name, stand_in in (
+        ("which_method", lambda *given: asked.append(given) or (choice,)),
+        ("haptic_study", lambda *_: with_failures(finding, [FAILED])),
+        ("choices", lambda _: Table(())),
+        ("work_precision", lambda **_: Table((Column("y"),), ((2,),))),
+    ):
         monkeypatch.setattr(f"reports.commands.bench.{name}", stand_in)
     status, found = answer("bench", "--budget", "50us", "--contacts", "7", "--coordinates", "3")
     assert asked == [(pytest.approx(5e-5), 7, 3)]
     assert status == 0 and found["choices"][0]["method"] == "factored"
     status, found = answer("bench")
     assert status == 1 and set(found) == listed("bench")
-    assert found["tables"]["one"] == [{"x": 1}] and found["tables"]["methods on problems"] == [{"y": 2}]
+    assert found["tables"]["one"] == [{"x": 1}] and found["tables"]["methods on problems"] == [
+        {"y": 2}
+    ]
     assert "Not computed: four contacts: SolverError: no solution" in iapb("bench")[1]
 
 
 def test_compare_puts_worlds_on_one_page_and_stores_them_with_their_figure(iapb, here):
-    door = ("compare", SLOPE.with_name("door.yaml"), "--set", "duration=0.15", "--worlds", "IAPB", "--against", "IAPB")
+    door = (
+        "compare",
+        SLOPE.with_name("door.yaml"),
+        "--set",
+        "duration=0.15",
+        "--worlds",
+        "IAPB",
+        "--against",
+        "IAPB",
+    )
     status, out, err = iapb(*door, "--impacts", "1")
     assert status == 0 and max(map(len, out.splitlines())) <= show.WIDTH, err
-    by_solver = {row[0]: row[2:6] for row in map(str.split, out.splitlines()) if {"none", "friction"} & set(row)}
+    by_solver = {
+        row[0]: row[2:6]
+        for row in map(str.split, out.splitlines())
+        if {"none", "friction"} & set(row)
+    }
     assert by_solver["lemke"] == by_solver["nsgs"] == ["1", "1", "0", "0"]
     place, slope = Path("mine/slope.json"), ("compare", SLOPE, "--set", "duration=0.05", "--worlds")
     status, out, err = iapb(*slope, "IAPB,ideal,ideal-friction", "--out", place)
@@ -367,13 +590,22 @@ def test_compare_puts_worlds_on_one_page_and_stores_them_with_their_figure(iapb,
     assert status == 0 and max(map(len, lines)) <= show.WIDTH and len(lines) < 60, err
     assert "Closest to ideal-friction is " in out and f"Stored in {place}" in out
     found = json.loads(place.read_text(encoding="utf-8"))
-    assert set(found["tables"]) == {"worlds", "over time"} and len(found["tables"]["over time"]["rows"]) == 3 * 51
-    assert [row[0] for row in found["tables"]["worlds"]["rows"]] == ["IAPB", "ideal", "ideal-friction"]
+    assert (
+        set(found["tables"]) == {"worlds", "over time"}
+        and len(found["tables"]["over time"]["rows"]) == 3 * 51
+    )
+    assert [row[0] for row in found["tables"]["worlds"]["rows"]] == [
+        "IAPB",
+        "ideal",
+        "ideal-friction",
+    ]
     assert "ideal-friction (reference)" in place.with_suffix(".svg").read_text(encoding="utf-8")
 
 
 def test_tables_and_sentences_fit_a_terminal_and_json_is_strict():
-    wide = titled(("name", *(f"quantity {k} [N s]" for k in range(12))), [("a", *map(float, range(12)))], 3)
+    wide = titled(
+        ("name", *(f"quantity {k} [N s]" for k in range(12))), [("a", *map(float, range(12)))], 3
+    )
     lines = show.table_text(wide).splitlines()
     assert max(map(len, lines)) <= show.WIDTH and lines.count("") == 1
     assert [line for line in lines if line.startswith("a ")][1].split()[-1] == "11"
@@ -382,8 +614,17 @@ def test_tables_and_sentences_fit_a_terminal_and_json_is_strict():
     lines = show.table_text(folded).splitlines()
     assert "empty" not in lines[0] and sum("words" in line for line in lines) == 3
     wrapped = show.sentence("word " * 40, "• ").splitlines()
-    assert max(map(len, wrapped)) <= show.WIDTH and wrapped[0].startswith("• ") and wrapped[1].startswith("  word")
-    facts = {"a": np.array([1.0, np.nan]), 2: Part("s", REPRODUCED), "c": Path("x"), "d": (np.int64(3), True, None)}
+    assert (
+        max(map(len, wrapped)) <= show.WIDTH
+        and wrapped[0].startswith("• ")
+        and wrapped[1].startswith("  word")
+    )
+    facts = {
+        "a": np.array([1.0, np.nan]),
+        2: Part("s", REPRODUCED),
+        "c": Path("x"),
+        "d": (np.int64(3), True, None),
+    }
     found = json.loads(show.Answer(facts, []).text(json_=True), parse_constant=pytest.fail)
     assert found["a"] == [1.0, None] and found["2"]["verdict"] == REPRODUCED and found["c"] == "x"
     assert found["d"] == [3, True, None]
@@ -400,7 +641,9 @@ def test_a_log_tells_of_a_stage_that_begins_and_of_one_that_goes_on(monkeypatch,
             said += capsys.readouterr().err
             if said.count("\n") > 1:
                 break
-    assert said.startswith("a stage [with brackets] ...\na stage [with brackets]: 2 of 1,000 after 0.0 min\n")
+    assert said.startswith(
+        "a stage [with brackets] ...\na stage [with brackets]: 2 of 1,000 after 0.0 min\n"
+    )
 
 
 @pytest.mark.parametrize("term", ["xterm", "dumb"])
@@ -412,4 +655,6 @@ def test_on_a_terminal_there_are_bars_unless_it_is_a_dumb_one(monkeypatch, capsy
         print("a result")
     out, err = capsys.readouterr()
     assert out == "a result\n" and "a stage [of work]" in err
-    assert ("\x1b[" in err) == (term == "xterm") and ("a stage [of work] ..." in err) == (term == "dumb")
+    assert ("\x1b[" in err) == (term == "xterm") and ("a stage [of work] ..." in err) == (
+        term == "dumb"
+    )

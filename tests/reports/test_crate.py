@@ -1,4 +1,5 @@
-"""What goes beside the report: true to the byte, described as RO-Crate 1.1 asks for, and silent about the machine."""
+"""What goes beside the report: true to the byte, described as RO-Crate 1.1 asks for, and silent
+about the machine."""
 
 import json
 import re
@@ -31,7 +32,10 @@ FIGURE = Figure("figA", "", "A", "See.", (PANEL,), titled(("x",), ((0.1,),)))
 def out(tmp_path_factory):
     """A small report from two runs and one stage, with everything beside it."""
     folder = tmp_path_factory.mktemp("elsewhere")
-    scene, runner = load_scene(find_scene("peg_corner")).with_values({"duration": 0.4}), Runner(folder / "runs")
+    scene, runner = (
+        load_scene(find_scene("peg_corner")).with_values({"duration": 0.4}),
+        Runner(folder / "runs"),
+    )
 
     def compute(failures):
         runner.user = "C07"
@@ -42,10 +46,20 @@ def out(tmp_path_factory):
 
     stage = Stage(folder / "tables", "claims", tuple[Finding, ...], "quick").fill(runner, compute)
     with pytest.MonkeyPatch.context() as patch:
-        words = [str(folder / "bin" / "iapb"), "reproduce", "--out", str(folder), f"--check={folder}"]
+        words = [
+            str(folder / "bin" / "iapb"),
+            "reproduce",
+            "--out",
+            str(folder),
+            f"--check={folder}",
+        ]
         patch.setattr(sys, "argv", words)
-        evidence = Evidence(inputs={"bulk": titled(("n",), ((3,),))}, claims=stage.records,
-                            provenance=gather.provenance(), runs=tuple(runner.used.values()))
+        evidence = Evidence(
+            inputs={"bulk": titled(("n",), ((3,),))},
+            claims=stage.records,
+            provenance=gather.provenance(),
+            runs=tuple(runner.used.values()),
+        )
         write_report(folder, build_report(evidence, [FIGURE]))
         write_companions(folder, evidence, [FIGURE], "quick")
     return folder
@@ -61,24 +75,38 @@ def references(value):
         yield from references(item)
 
 
-def test_the_crate_says_what_ro_crate_1_1_asks_for_and_names_the_report_the_numbers_and_the_runs(out):
+def test_the_crate_says_what_ro_crate_1_1_asks_for_and_names_the_report_the_numbers_and_the_runs(
+    out,
+):
     crate = json.loads((out / CRATE_NAME).read_text())
     assert crate["@context"] == f"{PROFILE}/context"
     entities = {entity["@id"]: entity for entity in crate["@graph"]}
     assert len(entities) == len(crate["@graph"]) and entities[CRATE_NAME]["about"] == {"@id": "./"}
-    assert not {name for name in references(crate["@graph"]) if name not in entities and not name.startswith("https")}
-    assert {"@type", "name", "description", "datePublished", "license", "author"} <= set(entities["./"])
+    assert not {
+        name
+        for name in references(crate["@graph"])
+        if name not in entities and not name.startswith("https")
+    }
+    assert {"@type", "name", "description", "datePublished", "license", "author"} <= set(
+        entities["./"]
+    )
     parts = [part["@id"] for part in entities["./"]["hasPart"]]
-    assert parts == [FIRST_PAGE, "report/", NUMBERS_NAME, "runs/"] and all((out / name).exists() for name in parts)
+    assert parts == [FIRST_PAGE, "report/", NUMBERS_NAME, "runs/"] and all(
+        (out / name).exists() for name in parts
+    )
     assert {name for name in parts if entities[name]["@type"] == "Dataset"} == {"report/", "runs/"}
 
 
 def test_the_numbers_are_those_of_tables_and_figures_and_name_each_run_with_its_hash(out):
     numbers = read_numbers(out)
     assert numbers.tables["claims/C07"].rows == ((1e3, 2e-16),)
-    assert numbers.tables["figures/figA"].rows == ((0.1,),) and numbers.tables["inputs/bulk"].rows == ((3,),)
+    assert numbers.tables["figures/figA"].rows == ((0.1,),) and numbers.tables[
+        "inputs/bulk"
+    ].rows == ((3,),)
     first, second = numbers.runs
-    assert first == "iapb run peg_corner --set duration=0.4 --world PB" and second.startswith("iapb store again ")
+    assert first == "iapb run peg_corner --set duration=0.4 --world PB" and second.startswith(
+        "iapb store again "
+    )
     hashes = {entry.content_hash for entry in Runner(out / "runs").store.entries()}
     assert set(numbers.runs.values()) == hashes
     page = (out / "report" / "provenance.html").read_text()
@@ -90,13 +118,26 @@ def test_nothing_says_on_which_machine_it_was_made(out):
     pages = [path.relative_to(out) for path in (out / "report").iterdir()]
     for name in (FIRST_PAGE, *pages, NUMBERS_NAME, CRATE_NAME):
         text = (out / name).read_text()
-        assert not [path for path in (out, provenance._ROOT, f"{Path.home()}/") if str(path) in text]
-        assert not host.search(text) or len(socket.gethostname()) < 4, name  # "x86" would be found in any page
+        assert not [
+            path for path in (out, provenance._ROOT, f"{Path.home()}/") if str(path) in text
+        ]
+        assert not host.search(text) or len(socket.gethostname()) < 4, (
+            name
+        )  # "x86" would be found in any page
 
 
-@pytest.mark.parametrize(("word", "kept"), [
-    ("--out=/srv/data/out", "--out=out"), ("/srv/data/out", "out"), ("../../her/out", "out"), ("out/runs", "out/runs"),
-    ("--set", "--set"), ("rate=1/512", "rate=1/512"), ("--check=../r.html", "--check=r.html")])  # fmt: skip
+@pytest.mark.parametrize(
+    ("word", "kept"),
+    [
+        ("--out=/srv/data/out", "--out=out"),
+        ("/srv/data/out", "out"),
+        ("../../her/out", "out"),
+        ("out/runs", "out/runs"),
+        ("--set", "--set"),
+        ("rate=1/512", "rate=1/512"),
+        ("--check=../r.html", "--check=r.html"),
+    ],
+)
 def test_paths_of_a_machine_are_cut_from_the_command(word, kept, monkeypatch):
     for program in ("/srv/bin/iapb", str(provenance._ROOT / "reports" / "cli.py")):
         monkeypatch.setattr(sys, "argv", [program, "run", word])
@@ -105,8 +146,11 @@ def test_paths_of_a_machine_are_cut_from_the_command(word, kept, monkeypatch):
 
 def test_uncommitted_changes_have_a_hash_until_they_are_committed(tmp_path, monkeypatch):
     def git(*words):
-        subprocess.run(["git", "-C", str(tmp_path), "-c", "user.name=n", "-c", "user.email=e@e", *words], check=True,
-                       capture_output=True)  # fmt: skip
+        subprocess.run(
+            ["git", "-C", str(tmp_path), "-c", "user.name=n", "-c", "user.email=e@e", *words],
+            check=True,
+            capture_output=True,
+        )
 
     monkeypatch.setattr(provenance, "_ROOT", tmp_path)
     assert provenance.uncommitted_changes() == provenance.UNKNOWN

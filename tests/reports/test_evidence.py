@@ -1,4 +1,5 @@
-"""The stages of the evidence: stored once, read as they were; what fails costs one row or one stage, and is named."""
+"""The stages of the evidence: stored once, read as they were; what fails costs one row or one
+stage, and is named."""
 
 import io
 import json
@@ -36,15 +37,51 @@ from verification.finding import NOT_COMPUTED, VERDICTS, Finding, Part, failure_
 from verification.proofs import all_proofs
 from verification.table import Column, Table
 
-ANY = (None, math.nan, math.inf, -math.inf, -0.0, 0.1, 5e-324, 3, -(2**53) - 1, 2**70, True, False,
-       "", "é", "nan", "True", "None", np.float32(0.5), np.int64(3), np.bool_(True))  # fmt: skip
+ANY = (
+    None,
+    math.nan,
+    math.inf,
+    -math.inf,
+    -0.0,
+    0.1,
+    5e-324,
+    3,
+    -(2**53) - 1,
+    2**70,
+    True,
+    False,
+    "",
+    "é",
+    "nan",
+    "True",
+    "None",
+    np.float32(0.5),
+    np.int64(3),
+    np.bool_(True),
+)
 FINDING = finding_of(
-    "mechanics", "Title", "Asked?", "Answered.",
+    "mechanics",
+    "Title",
+    "Asked?",
+    "Answered.",
     (Part("s", VERDICTS[0], name="p", held=1, decided=2, fails="x", timed=True),),
-    {"judged": Table((Column("n", "N s", condition=True, part=True), Column("time", "s", timed=True),
-                      Column("said", prose=True)), ((1, 0.5, "a"), (2, None, "b"), (3, math.inf, "c")),
-                     (True, None, False), 3, "a note", True),
-     "empty": Table((Column("row"),)), "bare": Table(())})  # fmt: skip
+    {
+        "judged": Table(
+            (
+                Column("n", "N s", condition=True, part=True),
+                Column("time", "s", timed=True),
+                Column("said", prose=True),
+            ),
+            ((1, 0.5, "a"), (2, None, "b"), (3, math.inf, "c")),
+            (True, None, False),
+            3,
+            "a note",
+            True,
+        ),
+        "empty": Table((Column("row"),)),
+        "bare": Table(()),
+    },
+)
 
 
 def nothing(*_):
@@ -59,10 +96,19 @@ def test_records_are_computed_once_and_come_back_with_every_type(tmp_path):
     calls = []
     table = Table((Column("a/b", "m"), Column("row")), tuple((cell, 0) for cell in ANY))
     for kind, records in ((Finding, FINDING), (Table, table)):
-        first, again = (filled(tmp_path, lambda _, own=records: calls.append(1) or own, kind, kind.__name__)
-                        for _ in range(2))
-        assert repr(first.records) == repr(again.records) == repr(replace(records, rows=tuple(
-            (keys.plain(cell), 0) for cell in ANY)) if kind is Table else records)
+        first, again = (
+            filled(tmp_path, lambda _, own=records: calls.append(1) or own, kind, kind.__name__)
+            for _ in range(2)
+        )
+        assert (
+            repr(first.records)
+            == repr(again.records)
+            == repr(
+                replace(records, rows=tuple((keys.plain(cell), 0) for cell in ANY))
+                if kind is Table
+                else records
+            )
+        )
     assert len(calls) == 2 and len(list((tmp_path / "tables").glob("*.h5"))) == 2
 
 
@@ -81,8 +127,10 @@ def test_a_stage_that_is_read_lists_the_runs_of_the_one_that_made_them(tmp_path)
     read = Stage(tmp_path, "mechanics", Finding, "quick").fill(Runner(tmp_path / "runs"), compute)
     assert made.runs == read.runs == runner.used
     commands = [(run.used_by, run.command) for run in read.runs.values()]
-    assert commands == [(users, f"iapb run peg_corner --set duration=0.4 --world {world}")
-                        for users, world in ((("mechanics", "C07"), "IAPB"), (("C07",), "PB"))]  # fmt: skip
+    assert commands == [
+        (users, f"iapb run peg_corner --set duration=0.4 --world {world}")
+        for users, world in ((("mechanics", "C07"), "IAPB"), (("C07",), "PB"))
+    ]
     assert runner.user == ""
 
 
@@ -113,11 +161,22 @@ def test_another_blas_kernel_or_numpy_code_is_another_machine_and_other_threads_
     if "openblas" not in linear_algebra() or dispatched() in (UNKNOWN, "baseline"):
         pytest.skip("numpy has another BLAS than OpenBLAS, or no optional code for this processor")
     program = "from reports.provenance import this_machine; print(this_machine())"
-    said = [subprocess.run([sys.executable, "-c", program], cwd=Path(__file__).parents[2], text=True, check=True,
-                           capture_output=True, env={**os.environ, **chosen}).stdout.strip()
-            for chosen in ({"OPENBLAS_CORETYPE": "Prescott"}, {"OPENBLAS_CORETYPE": "Haswell"},
-                           {"OPENBLAS_CORETYPE": "Haswell", "OPENBLAS_NUM_THREADS": "1"},
-                           {"NPY_DISABLE_CPU_FEATURES": dispatched()})]  # fmt: skip
+    said = [
+        subprocess.run(
+            [sys.executable, "-c", program],
+            cwd=Path(__file__).parents[2],
+            text=True,
+            check=True,
+            capture_output=True,
+            env={**os.environ, **chosen},
+        ).stdout.strip()
+        for chosen in (
+            {"OPENBLAS_CORETYPE": "Prescott"},
+            {"OPENBLAS_CORETYPE": "Haswell"},
+            {"OPENBLAS_CORETYPE": "Haswell", "OPENBLAS_NUM_THREADS": "1"},
+            {"NPY_DISABLE_CPU_FEATURES": dispatched()},
+        )
+    ]
     assert said[0] != said[1] == said[2] and "numpy baseline" in said[3]
 
 
@@ -141,8 +200,11 @@ def test_a_damaged_or_wrong_or_interrupted_stage_gives_no_records(tmp_path):
     assert not list(tmp_path.rglob("tables/*.h5"))
     path = filled(tmp_path, lambda _: FINDING).path
     whole = path.read_bytes()
-    for damage, said in ((flipped, ""), (lambda content: content[:-100], "checksum"),
-                         (without_records, "json is missing")):  # fmt: skip
+    for damage, said in (
+        (flipped, ""),
+        (lambda content: content[:-100], "checksum"),
+        (without_records, "json is missing"),
+    ):
         path.write_bytes(damage(whole))
         damaged = filled(tmp_path, lambda _: FINDING)
         assert damaged.records is None and damaged.failures[0].error == "RunFileError"
@@ -160,9 +222,17 @@ def test_a_stage_with_failures_is_computed_again_and_its_traceback_is_kept_until
     for expected in (("one",), ("one", "two"), ("one", "two")):
         stage = filled(tmp_path, compute, tuple[str, ...])
         failed = gather.failed_cases(tmp_path / "tables", {stage.name: stage.failures})
-        assert stage.records == expected and stage.path.is_file() and len(failed) == (len(expected) == 1)
+        assert (
+            stage.records == expected
+            and stage.path.is_file()
+            and len(failed) == (len(expected) == 1)
+        )
         assert not failed or "planted" in Path(failed[0].file).read_text()
-    assert len(calls) == 2 and not list(tmp_path.rglob("*incomplete*")) and not list(tmp_path.rglob("*failed*"))
+    assert (
+        len(calls) == 2
+        and not list(tmp_path.rglob("*incomplete*"))
+        and not list(tmp_path.rglob("*failed*"))
+    )
 
 
 def test_a_stage_computed_in_a_process_is_that_of_this_process(tmp_path, monkeypatch):
@@ -173,8 +243,12 @@ def test_a_stage_computed_in_a_process_is_that_of_this_process(tmp_path, monkeyp
     monkeypatch.setattr(gather, "REPORT_WORKERS", 1)
     made = {name: Stage(tmp_path / "tables", name, plan.kind, "quick")}
     gather._compute_beside(made, tmp_path, "quick", lambda *given: said.append(given))
-    read = Stage(tmp_path / "tables", name, plan.kind, "quick").fill(Runner(tmp_path / "runs"), pytest.fail)
-    assert made[name].records == read.records and {record.name for record in read.records} == set(all_proofs())
+    read = Stage(tmp_path / "tables", name, plan.kind, "quick").fill(
+        Runner(tmp_path / "runs"), pytest.fail
+    )
+    assert made[name].records == read.records and {record.name for record in read.records} == set(
+        all_proofs()
+    )
     assert said[0] == (gather.BESIDE, 0, 3) and said[-1] == (gather.BESIDE, 3, 3)
 
 
@@ -190,7 +264,9 @@ def test_a_topic_that_fails_is_named_and_ctrl_c_is_no_failure(tmp_path, monkeypa
     assert topic.key == "mechanics" and [part.verdict for part in topic.parts] == [NOT_COMPUTED]
     page = build_report(Evidence(topics=(topic,)))[FIRST_PAGE]
     first = page.split('<section id="verdict"')[1].split("</section>")[0]
-    assert "Not computed, after RuntimeError: the disk went away." in first and "and more" not in first
+    assert (
+        "Not computed, after RuntimeError: the disk went away." in first and "and more" not in first
+    )
     with pytest.raises(KeyboardInterrupt):
         gather._fill(again, Runner(tmp_path / "runs"), "quick", nothing)
 
@@ -212,8 +288,14 @@ def of_claims(patch, folder, failures):
     chosen = {name: verification.claims.CLAIMS[name] for name in ("C01", "C07")}
     chosen["C01"] = replace(chosen["C01"], cases=broken(chosen["C01"].cases, lambda study: True))
     patch.setattr(verification.claims, "CLAIMS", chosen)
-    patch.setattr(arm, "strike", broken(arm.strike, lambda robot, place, angle, e: (place, angle) ==
-                                                (arm.PLACES[0], arm.ANGLES[0])))  # fmt: skip
+    patch.setattr(
+        arm,
+        "strike",
+        broken(
+            arm.strike,
+            lambda robot, place, angle, e: (place, angle) == (arm.PLACES[0], arm.ANGLES[0]),
+        ),
+    )
     first, second = topics.checked_claims("claims", Runner(folder), "quick", nothing, failures)
     assert (first.verdict, first.tables["C01"].rows) == (NOT_COMPUTED, ())
     assert len(second.tables["C07"].rows) == 2 * len(arm.PLACES) * len(arm.ANGLES) - 2
@@ -221,24 +303,51 @@ def of_claims(patch, folder, failures):
 
 def of_effects(patch, folder, failures):
     patch.setattr(effects, "scene_names", lambda: ("peg_corner", "arm_pushing"))
-    patch.setattr(effects, "load_scene", broken(effects.load_scene, lambda path: path.stem == "arm_pushing"))
+    patch.setattr(
+        effects, "load_scene", broken(effects.load_scene, lambda path: path.stem == "arm_pushing")
+    )
     impulses = effects.LEFT_OUT["impulses"]
-    patch.setattr(effects, "_loop", broken(effects._loop, lambda scene, world, variant: variant is impulses))
+    patch.setattr(
+        effects, "_loop", broken(effects._loop, lambda scene, world, variant: variant is impulses)
+    )
     found = effects.effects_of_scenes(nothing, failures)
-    changes = {row["effect"]: row["change"] for row in found["peg_corner"].records() if row["active"]}
-    assert list(found) == ["peg_corner"] and changes.pop("impulses") is None and None not in changes.values()
+    changes = {
+        row["effect"]: row["change"] for row in found["peg_corner"].records() if row["active"]
+    }
+    assert (
+        list(found) == ["peg_corner"]
+        and changes.pop("impulses") is None
+        and None not in changes.values()
+    )
 
 
 def of_runs(patch, folder, failures):
-    patch.setattr(runs, "FIGURE_RUNS", {name: runs.FIGURE_RUNS[name] for name in ("corner/IAPB", "group/IAPB")})
-    patch.setattr(runs, "shipped_scene", broken(runs.shipped_scene, lambda name, values: name == "peg_hole"))
+    patch.setattr(
+        runs,
+        "FIGURE_RUNS",
+        {name: runs.FIGURE_RUNS[name] for name in ("corner/IAPB", "group/IAPB")},
+    )
+    patch.setattr(
+        runs, "shipped_scene", broken(runs.shipped_scene, lambda name, values: name == "peg_hole")
+    )
     assert list(runs.figure_runs(Runner(folder), nothing, failures)) == ["corner/IAPB"]
 
 
-@pytest.mark.parametrize(("stage", "failed"), [
-    (of_claims, ["C01", "C07, uniform rods, 0.0, 0.1", "C07, point masses at the ends of the links, 0.0, 0.1"]),
-    (of_effects, ["peg_corner, impulses", "arm_pushing"]), (of_runs, ["group/IAPB"]),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("stage", "failed"),
+    [
+        (
+            of_claims,
+            [
+                "C01",
+                "C07, uniform rods, 0.0, 0.1",
+                "C07, point masses at the ends of the links, 0.0, 0.1",
+            ],
+        ),
+        (of_effects, ["peg_corner, impulses", "arm_pushing"]),
+        (of_runs, ["group/IAPB"]),
+    ],
+)
 def test_a_case_that_raises_costs_its_row_only(stage, failed, monkeypatch, tmp_path):
     failures = []
     stage(monkeypatch, tmp_path, failures)
@@ -251,16 +360,30 @@ def test_the_last_lines_say_what_failed_and_where_the_traceback_is(monkeypatch, 
 
     path = str(tmp_path / "tables" / "claims-failed.txt")
     failures = tuple(failure_of(f"C{n:02d}", ValueError("planted\nand more")) for n in range(1, 23))
-    recipes = Recipe("hero", (), fails), Recipe("film-corner", (), lambda: Drawn([Panel("<svg />", "alt")]))
+    recipes = (
+        Recipe("hero", (), fails),
+        Recipe("film-corner", (), lambda: Drawn([Panel("<svg />", "alt")])),
+    )
     monkeypatch.setattr(reproduce, "RECIPES", recipes)
-    monkeypatch.setattr(reproduce, "gather", lambda *_: Evidence(failed=(FailedCases("claims", failures, path),)))
+    monkeypatch.setattr(
+        reproduce, "gather", lambda *_: Evidence(failed=(FailedCases("claims", failures, path),))
+    )
     answer = reproduce.make_report(tmp_path, "quick")
     assert answer.status == 1 and answer.facts["failed"][0] == FailedCases("claims", failures, path)
-    lines = answer.lines[next(k for k, line in enumerate(answer.lines) if "Not computed" in line):]
-    assert lines[:2] == ["\nNot computed: 23 cases. The next call tries again.", "  claims: C01: ValueError: planted"]
-    assert lines[21:24] == ["  claims: and 2 more", f"    tracebacks: {path}", "  figures: hero: ValueError: planted"]
+    lines = answer.lines[next(k for k, line in enumerate(answer.lines) if "Not computed" in line) :]
+    assert lines[:2] == [
+        "\nNot computed: 23 cases. The next call tries again.",
+        "  claims: C01: ValueError: planted",
+    ]
+    assert lines[21:24] == [
+        "  claims: and 2 more",
+        f"    tracebacks: {path}",
+        "  figures: hero: ValueError: planted",
+    ]
     assert "in fails" in (tmp_path / "tables" / "figures-failed.txt").read_text(encoding="utf-8")
-    assert "C22: ValueError: planted" in (tmp_path / "report" / "claims.html").read_text(encoding="utf-8")
+    assert "C22: ValueError: planted" in (tmp_path / "report" / "claims.html").read_text(
+        encoding="utf-8"
+    )
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "Not computed in this run" in page and 'id="film-corner"' in page
     assert not (tmp_path / "tables" / "answer.json").exists()  # the next call tries again
@@ -272,10 +395,16 @@ def test_an_unchanged_report_keeps_its_answer_and_a_changed_one_does_not(tmp_pat
         (tmp_path / name).write_text(name)
     key = report_key(tmp_path, "quick")
     assert kept_answer(tmp_path, key) is None and report_key(tmp_path, "full") != key
-    for change in (lambda: (tmp_path / "report.html").write_text("other"), (tmp_path / "runs.h5").unlink,
-                   lambda: (tmp_path / "tables/answer.json").write_text("{")):
+    for change in (
+        lambda: (tmp_path / "report.html").write_text("other"),
+        (tmp_path / "runs.h5").unlink,
+        lambda: (tmp_path / "tables/answer.json").write_text("{"),
+    ):
         keep_answer(tmp_path, key, {"page": tmp_path}, ["said"], ["runs.h5"])
-        assert kept_answer(tmp_path, key) == (json.loads(json.dumps({"page": str(tmp_path)})), ["said"])
+        assert kept_answer(tmp_path, key) == (
+            json.loads(json.dumps({"page": str(tmp_path)})),
+            ["said"],
+        )
         assert kept_answer(tmp_path, "another") is None
         change()
         assert kept_answer(tmp_path, key) is None

@@ -1,4 +1,5 @@
-"""Figures, each drawn once from made-up inputs: bytes, colours, names at curves, shapes, numbers of Figure 3."""
+"""Figures, each drawn once from made-up inputs: bytes, colours, names at curves, shapes, numbers of
+Figure 3."""
 
 import re
 import xml.etree.ElementTree as ElementTree
@@ -39,90 +40,228 @@ from verification.table import titled
 MOST_SERIES = 6
 OF_WORLDS = {(look.color, look.marker): names for names, look in LOOKS[:7] if look.marker}
 SCENES = tuple(f"scene {k}" for k in range(6))
-CHECKS = {"mechanics": mechanics.checks, "stability": contact_stability.checks, "complementarity": [TWO_CONTACTS]}
+CHECKS = {
+    "mechanics": mechanics.checks,
+    "stability": contact_stability.checks,
+    "complementarity": [TWO_CONTACTS],
+}
 METHODS = (*WORLDS, "MuJoCo")
 
 
 def tables():
-    """Return a made-up table for each input of a figure that is a table and takes long to compute."""
+    """Return a made-up table for each input of a figure that is a table and takes long to
+    compute."""
     made = {
-        "C22/C22": ("problem; contacts; ratio; lower quartile; upper quartile", (
-            (problem, c, r, 0.97 * r, 1.03 * r) for problem, power in (("a patch", 0.9), ("a pile", -0.05))
-            for c in (1, 2, 4, 8, 16, 64, 300) for r in [c**power])),
+        "C22/C22": (
+            "problem; contacts; ratio; lower quartile; upper quartile",
+            (
+                (problem, c, r, 0.97 * r, 1.03 * r)
+                for problem, power in (("a patch", 0.9), ("a pile", -0.05))
+                for c in (1, 2, 4, 8, 16, 64, 300)
+                for r in [c**power]
+            ),
+        ),
         "complementarity/map": (
-            "impacts; e; redundant rows; share that agrees; median distance where they differ; largest distance", (
+            "impacts; e; redundant rows; share that agrees; median distance where they differ; largest distance",
+            (
                 (family, e, k, 1.0 - 0.2 * k, 0.3 * k * (1 + e) or None, 0.5 * k * (1 + e))
-                for family in ("one contact", "corner") for k in (0, 2) for e in (0.0, 0.5, 1.0))),
+                for family in ("one contact", "corner")
+                for k in (0, 2)
+                for e in (0.0, 0.5, 1.0)
+            ),
+        ),
         "complementarity/piles": (
-            "rows; contacts; share that agrees; most contacts that agree; share of impulses that pull; "
-            "pushing from the LCP; time of (21) [µs]; time of pushing [µs]", (
-                (rows, c, 1.0 * (c < 6), 6, 0.0 if c < 6 else 0.1 * c**0.3, 1e-16, 40.0 + c, 300.0 + c * c)
-                for rows in ("approaching", "touching") for c in (5, 12, 40, 150))),
-        "effect_costs": ("scene; effect; time saved [%]; error [mm]; best of its error", (
-            ("peg_corner", effect, 60.0 / (k + 1), 10.0 ** (2 - k) if k < 4 else 0.0, "yes" if k % 2 else "no")
-            for k, effect in enumerate(("hand_force", "wall_contacts", "coherence", "clustering", "friction")))),
-        "effect_steps": ("scene; step [µs]; all on [µs]; shares of the step", (
-            (scene, 0.5 * (k + 1), 0.8 * (k + 1), "friction 40 % (0.2 µs), coupling 20 % (0.1 µs)")
-            for k, scene in enumerate(SCENES))),
-        "energy-gains/impacts": ("; ".join((energy_gains.METHOD, energy_gains.CONDITION, energy_gains.GAIN,
-                                            energy_gains.SHARE)), (
-            (method, f"1e{k}" if k < 12 else "all", gain * 10.0**k, gain * 10.0 ** (k + 10))
-            for method, gain in (("factored", 0.0), ("factored, no clamp", 1e-17), ("gram_pinv, as printed", 1e-15))
-            for k in range(13))),
+            "rows; contacts; share that agrees; most contacts that agree; share of impulses that "
+            "pull; "
+            "pushing from the LCP; time of (21) [µs]; time of pushing [µs]",
+            (
+                (
+                    rows,
+                    c,
+                    1.0 * (c < 6),
+                    6,
+                    0.0 if c < 6 else 0.1 * c**0.3,
+                    1e-16,
+                    40.0 + c,
+                    300.0 + c * c,
+                )
+                for rows in ("approaching", "touching")
+                for c in (5, 12, 40, 150)
+            ),
+        ),
+        "effect_costs": (
+            "scene; effect; time saved [%]; error [mm]; best of its error",
+            (
+                (
+                    "peg_corner",
+                    effect,
+                    60.0 / (k + 1),
+                    10.0 ** (2 - k) if k < 4 else 0.0,
+                    "yes" if k % 2 else "no",
+                )
+                for k, effect in enumerate(
+                    ("hand_force", "wall_contacts", "coherence", "clustering", "friction")
+                )
+            ),
+        ),
+        "effect_steps": (
+            "scene; step [µs]; all on [µs]; shares of the step",
+            (
+                (
+                    scene,
+                    0.5 * (k + 1),
+                    0.8 * (k + 1),
+                    "friction 40 % (0.2 µs), coupling 20 % (0.1 µs)",
+                )
+                for k, scene in enumerate(SCENES)
+            ),
+        ),
+        "energy-gains/impacts": (
+            "; ".join(
+                (energy_gains.METHOD, energy_gains.CONDITION, energy_gains.GAIN, energy_gains.SHARE)
+            ),
+            (
+                (method, f"1e{k}" if k < 12 else "all", gain * 10.0**k, gain * 10.0 ** (k + 10))
+                for method, gain in (
+                    ("factored", 0.0),
+                    ("factored, no clamp", 1e-17),
+                    ("gram_pinv, as printed", 1e-15),
+                )
+                for k in range(13)
+            ),
+        ),
         "haptic-rate/budgets": (
-            "contacts; rank; budget [rows]; median residual; share of the loss; largest relative gain", (
-            (6 * n, n, k, 0.5 * (1 - k / n), k / n, -0.1) for n in (4, 8, 20) for k in range(n + 1))),
-        "haptic-rate/fitted": ("method; axis; exponent; steepest from; to; there", (
-            (method, axis, 0.9, 1000, 2000, 1.1) for method in (FACTORED, PRINTED)
-            for axis in ("contacts", "coordinates"))),
-        "haptic-rate/scaling": ("method; coordinates; contacts; time [µs]; lower quartile [µs]; upper quartile [µs]", (
-            (method, d, c, t, 0.9 * t, 1.1 * t) for k, method in enumerate((FACTORED, PRINTED))
-            for d, c in ((12, 50), (12, 300), (12, 2000), (3, 60), (24, 60), (96, 60))
-            for t in [10.0**k * d * c ** (0.9 + k)])),
+            "contacts; rank; budget [rows]; median residual; share of the loss; largest relative gain",
+            (
+                (6 * n, n, k, 0.5 * (1 - k / n), k / n, -0.1)
+                for n in (4, 8, 20)
+                for k in range(n + 1)
+            ),
+        ),
+        "haptic-rate/fitted": (
+            "method; axis; exponent; steepest from; to; there",
+            (
+                (method, axis, 0.9, 1000, 2000, 1.1)
+                for method in (FACTORED, PRINTED)
+                for axis in ("contacts", "coordinates")
+            ),
+        ),
+        "haptic-rate/scaling": (
+            "method; coordinates; contacts; time [µs]; lower quartile [µs]; upper quartile [µs]",
+            (
+                (method, d, c, t, 0.9 * t, 1.1 * t)
+                for k, method in enumerate((FACTORED, PRINTED))
+                for d, c in ((12, 50), (12, 300), (12, 2000), (3, 60), (24, 60), (96, 60))
+                for t in [10.0**k * d * c ** (0.9 + k)]
+            ),
+        ),
         "haptic-rate/motions": (
-            "scene; method; step [ms]; time [ms/s]; position; energy; signed energy; energy made; outcome; note", (
-                (scene, method, h, (k + 1) * 4.0 / h,
-                 0.02 * (0.5 * k + m + 1) * h ** (0.5 + 0.2 * k) if k < 6 else 0.05, 1e-10, -1e-10, 0.01 * (k == 3),
-                 TIMED_OUT if h < 0.1 and k == 1 else OK,
-                 f"position {BELOW}" if (h, k) == (0.5, 2) else "")
-                for m, scene in enumerate(SCENES) for k, method in enumerate(METHODS)
-                for h in (8.0, 2.0, 0.5, 0.1, 0.02))),
+            "scene; method; step [ms]; time [ms/s]; position; energy; signed energy; energy made; outcome; note",
+            (
+                (
+                    scene,
+                    method,
+                    h,
+                    (k + 1) * 4.0 / h,
+                    0.02 * (0.5 * k + m + 1) * h ** (0.5 + 0.2 * k) if k < 6 else 0.05,
+                    1e-10,
+                    -1e-10,
+                    0.01 * (k == 3),
+                    TIMED_OUT if h < 0.1 and k == 1 else OK,
+                    f"position {BELOW}" if (h, k) == (0.5, 2) else "",
+                )
+                for m, scene in enumerate(SCENES)
+                for k, method in enumerate(METHODS)
+                for h in (8.0, 2.0, 0.5, 0.1, 0.02)
+            ),
+        ),
         "scene-ledger/books over time": (
-            "scene; time [s]; kinetic [J]; potential [J]; springs [J]; given [J]; lost impacts [J]; lost damping [J]; "
-            "lost friction [J]; impacts", (
-                (scene, 0.1 * n, k * exp(-0.1 * n), 0.0, 0.1 * k * sin(n) ** 2, 0.0, k - k * exp(-0.1 * n), 0.0, 0.0,
-                 n % 7 == 0)
-                for k, scene in enumerate(SCENES) for n in range(20))),
-        "scene-ledger/contact": ("scene; dimensions; most penetration [mm]; how it ends; energy exchanged [J]", (
-            (scene, 2 + k % 2, 0.3 * k, "keeps moving", 0.1 * k) for k, scene in enumerate(SCENES))),
+            "scene; time [s]; kinetic [J]; potential [J]; springs [J]; given [J]; lost impacts "
+            "[J]; lost damping [J]; "
+            "lost friction [J]; impacts",
+            (
+                (
+                    scene,
+                    0.1 * n,
+                    k * exp(-0.1 * n),
+                    0.0,
+                    0.1 * k * sin(n) ** 2,
+                    0.0,
+                    k - k * exp(-0.1 * n),
+                    0.0,
+                    0.0,
+                    n % 7 == 0,
+                )
+                for k, scene in enumerate(SCENES)
+                for n in range(20)
+            ),
+        ),
+        "scene-ledger/contact": (
+            "scene; dimensions; most penetration [mm]; how it ends; energy exchanged [J]",
+            (
+                (scene, 2 + k % 2, 0.3 * k, "keeps moving", 0.1 * k)
+                for k, scene in enumerate(SCENES)
+            ),
+        ),
         "work_precision": (
-            "contacts; coordinates; problem; method; work; called; time [µs]; quartiles [µs]; relative error; "
-            "relative energy gain; restitution residual; failed after [µs]; outcome", precision_rows()),
-    }  # fmt: skip
+            "contacts; coordinates; problem; method; work; called; time [µs]; quartiles [µs]; "
+            "relative error; "
+            "relative energy gain; restitution residual; failed after [µs]; outcome",
+            precision_rows(),
+        ),
+    }
     return {name: titled(columns.split("; "), rows) for name, (columns, rows) in made.items()}
 
 
 def precision_rows():
     for (c, d), n, (k, way) in product(((1, 3), (60, 12)), range(9), enumerate(WAYS)):
-        lost, time, error = k == 4 and n == 8, 0.3 * c * (1.0 + 0.2 * k), 10.0 ** -(2 + 0.7 * k + 0.1 * n)
-        measured = (None, "", None, None, None, time, "too slow") if lost else (
-            time, "", error, 1e-3 * (way.work == "1 sweep"), 0.0, None, "ok")
+        lost, time, error = (
+            k == 4 and n == 8,
+            0.3 * c * (1.0 + 0.2 * k),
+            10.0 ** -(2 + 0.7 * k + 0.1 * n),
+        )
+        measured = (
+            (None, "", None, None, None, time, "too slow")
+            if lost
+            else (time, "", error, 1e-3 * (way.work == "1 sweep"), 0.0, None, "ok")
+        )
         yield (c, d, f"problem {n}", way.method, way.work, way.called, *measured)
 
 
 def all_inputs():
     """Return the inputs of all figures: made up or computed at once."""
     needed = sorted({name for recipe in RECIPES for name in recipe.needs})
-    scenes = {"corner": "peg_corner", "device": "peg_corner", "group": "arm_pushing",
-              "wall": "wall_1d"}
-    runs = {name: made_motion(scenes[name.split("/")[0]], k) for k, name in enumerate(needed)
-            if name.split("/")[0] in scenes}  # fmt: skip
-    given = {name: load_scene(find_scene(name[6:])).resolved() for name in needed if name.startswith("scene/")}
+    scenes = {
+        "corner": "peg_corner",
+        "device": "peg_corner",
+        "group": "arm_pushing",
+        "wall": "wall_1d",
+    }
+    runs = {
+        name: made_motion(scenes[name.split("/")[0]], k)
+        for k, name in enumerate(needed)
+        if name.split("/")[0] in scenes
+    }
+    given = {
+        name: load_scene(find_scene(name[6:])).resolved()
+        for name in needed
+        if name.startswith("scene/")
+    }
     tilted = {tilt: {name: runs[f"corner/{name}"] for name in UNLIMITED} for tilt in (0.0, 0.015)}
-    study, checks = Study(), {f"{topic}/{check.key}": check for topic, checks in CHECKS.items() for check in checks}
+    study, checks = (
+        Study(),
+        {f"{topic}/{check.key}": check for topic, checks in CHECKS.items() for check in checks},
+    )
     computed = {name: checks[name].table(study) for name in needed if name in checks}
-    return {**runs, **given, **tables(), **computed, TILTED: tilted, "arm_energies": arm_energies(),
-            "machine": "a processor, report of today"}
+    return {
+        **runs,
+        **given,
+        **tables(),
+        **computed,
+        TILTED: tilted,
+        "arm_energies": arm_energies(),
+        "machine": "a processor, report of today",
+    }
 
 
 @pytest.fixture(scope="module")
@@ -167,22 +306,36 @@ def test_words_of_curves_stand_in_a_legend_above_the_axes():
 def test_a_name_has_one_colour_and_one_marker_in_every_figure(gallery):
     """A world keeps its look in all figures, and nothing else that is joined by a line has it."""
     seen, looks = set(), [(look.color, look.marker, look.filled) for _, look in LOOKS]
-    assert len(set(looks)) == len(looks) and not {(look.color, look.marker) for look in CYCLE} & set(OF_WORLDS)
+    assert len(set(looks)) == len(looks) and not {
+        (look.color, look.marker) for look in CYCLE
+    } & set(OF_WORLDS)
     for line in gallery.lines:
-        name, look = str(line.get_gid()).removeprefix("curve="), (line.get_color(), line.get_marker())
+        name, look = (
+            str(line.get_gid()).removeprefix("curve="),
+            (line.get_color(), line.get_marker()),
+        )
         if name in STYLES:
             seen.add(name)
-            assert look[0] == STYLES[name].color and look[1] in (STYLES[name].marker, "", "None"), name
+            assert look[0] == STYLES[name].color and look[1] in (STYLES[name].marker, "", "None"), (
+                name
+            )
         elif look in OF_WORLDS and line.get_linestyle() != "None":
             raise AssertionError((name, look))
     assert seen >= {"ideal", "IAPB", "PB", "CBuc", "psaturated", "Lemke", "printed, numpy"}
     for figure in gallery.drawn:
         for text, look in figure.legend:
-            assert (look.color, look.marker) == (STYLES.get(text, look).color, STYLES.get(text, look).marker), text
+            assert (look.color, look.marker) == (
+                STYLES.get(text, look).color,
+                STYLES.get(text, look).marker,
+            ), text
 
 
 def test_a_plot_has_at_most_six_series_each_named_in_the_legend_in_a_style_of_its_own(figure):
-    styles = [(look.marker, look.dash, look.filled, look.width > 0) for _, look in figure.legend if look.name]
+    styles = [
+        (look.marker, look.dash, look.filled, look.width > 0)
+        for _, look in figure.legend
+        if look.name
+    ]
     assert len(set(styles)) == len(styles)  # even without their colour
     for panel in figure.panels:
         names = set(re.findall(r'data-curve="([^"]+)"', panel.svg))
@@ -201,12 +354,18 @@ def test_a_drawing_is_whole_asks_for_nothing_and_takes_the_colours_of_the_page(f
     known = {f"var(--{name}, {value})" for value, name in VARIABLES.items()}
     for panel in figure.panels:
         ElementTree.fromstring(panel.svg)
-        links = re.findall(r'(?:href|src)="([^"]*)"', panel.svg) + re.findall(r"url\(([^)]*)\)", panel.svg)
+        links = re.findall(r'(?:href|src)="([^"]*)"', panel.svg) + re.findall(
+            r"url\(([^)]*)\)", panel.svg
+        )
         assert set(links) <= {f"#{name}" for name in re.findall(r'\sid="([^"]*)"', panel.svg)}
         used = set(re.findall(r"(?:fill|stroke): ([^;\"]+)", panel.svg))
-        assert {color for color in used if not color.startswith("url(#")} <= known | {"none"}  # url: a hatch
+        assert {color for color in used if not color.startswith("url(#")} <= known | {
+            "none"
+        }  # url: a hatch
         assert "<style" not in panel.svg and panel.alt and not re.search(r"\bnan\b", panel.svg)
-    assert figure.numbers is None or all(len(row) == len(figure.numbers.columns) for row in figure.numbers.rows)
+    assert figure.numbers is None or all(
+        len(row) == len(figure.numbers.columns) for row in figure.numbers.rows
+    )
     said = figure.caption, *figure.said
     assert len("".join(said)) > 80 and "{" not in "".join(said) and len(figure.said) in (0, 4)
 
@@ -220,7 +379,10 @@ def test_a_table_is_html_in_the_page_and_in_its_own_file(gallery):
 
 def test_figure_3_has_the_energies_that_follow_from_the_geometry():
     table, share = arm_energies(), 1 - np.linspace(0.0, 1.0, 41) ** 2
-    for reading, before, at_a, at_b in (("uniform rods", 7 / 3, 0.379845, 0.0), ("point masses", 5.0, 0.0345, 1.0)):
+    for reading, before, at_a, at_b in (
+        ("uniform rods", 7 / 3, 0.379845, 0.0),
+        ("point masses", 5.0, 0.0345, 1.0),
+    ):
         assert table[f"{reading}, KE0"] == pytest.approx(before, abs=1e-15)
         assert table[f"{reading}, A"][0] == pytest.approx(at_a, abs=5e-5)
         assert table[f"{reading}, B"][0] == pytest.approx(at_b, abs=1e-12)
@@ -229,9 +391,13 @@ def test_figure_3_has_the_energies_that_follow_from_the_geometry():
             np.testing.assert_allclose(lost, share * lost[0], atol=1e-13)
 
 
-@pytest.mark.parametrize(("problem", "balls"), [
-    (CRADLE, linked_impacts.cradle()), (BERNOULLI, linked_impacts.bernoulli())])  # fmt: skip
-def test_a_figure_reads_the_outcomes_of_linked_impacts_as_they_were_computed(problem, balls, gallery):
+@pytest.mark.parametrize(
+    ("problem", "balls"),
+    [(CRADLE, linked_impacts.cradle()), (BERNOULLI, linked_impacts.bernoulli())],
+)
+def test_a_figure_reads_the_outcomes_of_linked_impacts_as_they_were_computed(
+    problem, balls, gallery
+):
     read = outcomes(gallery.inputs["mechanics/linked impacts"], problem)
     for ours, (treatment, rows, velocity) in zip(read, linked_impacts.outcomes(balls), strict=True):
         assert (ours.treatment, ours.rows) == (treatment, rows)
@@ -245,10 +411,18 @@ def test_a_map_counts_what_holds_and_keeps_the_numbers_of_its_axes():
     assert not re.search(r'="[^"]*\d\.\d{3}', panel.svg)  # coordinates are rounded
 
 
-@pytest.mark.parametrize(("value", "text"), [
-    (0.0, "0"), (-1.5, "−1.500"), (123456.0, "1.235 × 10⁵"), (1e-9, "1 × 10⁻⁹"), (99999.9, "100000"),
-    (float("inf"), "∞"), (float("nan"), "not a number"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.0, "0"),
+        (-1.5, "−1.500"),
+        (123456.0, "1.235 × 10⁵"),
+        (1e-9, "1 × 10⁻⁹"),
+        (99999.9, "100000"),
+        (float("inf"), "∞"),
+        (float("nan"), "not a number"),
+    ],
+)
 def test_numbers_for_people(value, text):
     assert format_number(value) == text
 
@@ -264,9 +438,13 @@ def test_bodies_are_closed_with_their_outside_out_and_where_the_engine_has_them(
         assert volumes.sum() > 0.0 and volumes.min() >= -1e-12 * volumes.sum()
         if len(piece.vertices) < 100:  # the poles of a ball are many corners in one place
             assert all((b, a) in edges for a, b in edges)
-    q = mechanism.integrate(System(scene).make_state().q, np.random.default_rng(4).normal(size=mechanism.nv), 0.7)
+    q = mechanism.integrate(
+        System(scene).make_state().q, np.random.default_rng(4).normal(size=mechanism.nv), 0.7
+    )
     rotations, origins = mechanism.placements(q)
-    for name, place in body_placements(resolved, mechanism.poses(q[None], planar=not is_spatial(resolved))[0]).items():
+    for name, place in body_placements(
+        resolved, mechanism.poses(q[None], planar=not is_spatial(resolved))[0]
+    ).items():
         body = mechanism.index(name)
         assert place.origin == pytest.approx(origins[body], abs=1e-12)
         assert place.rotation == pytest.approx(rotations[body], abs=1e-12)

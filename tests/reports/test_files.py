@@ -1,4 +1,5 @@
-"""Keys, files of runs and tables: the way there and back, what other programs see, what a damaged file is worth."""
+"""Keys, files of runs and tables: the way there and back, what other programs see, what a damaged
+file is worth."""
 
 import dataclasses
 import io
@@ -26,9 +27,13 @@ from reports.store.schema import FORMAT_VERSION
 from tests.reports.made_up import made_run
 
 TURNED = {
-    "q": np.tile([1.0, 0.0, 0.0, 0.0], (21, 1)), "device_q": np.tile([1.0, 0.0, 0.0, 0.0], (21, 1)),
-    "coordinate_names": ("base.w", "base.x", "base.y", "base.z"), "coordinate_units": ("1",) * 4,
-    "velocity_names": ("base.rx", "base.ry", "base.rz"), "velocity_units": ("rad/s",) * 3, "tool_coordinates": (0, 4),
+    "q": np.tile([1.0, 0.0, 0.0, 0.0], (21, 1)),
+    "device_q": np.tile([1.0, 0.0, 0.0, 0.0], (21, 1)),
+    "coordinate_names": ("base.w", "base.x", "base.y", "base.z"),
+    "coordinate_units": ("1",) * 4,
+    "velocity_names": ("base.rx", "base.ry", "base.rz"),
+    "velocity_units": ("rad/s",) * 3,
+    "tool_coordinates": (0, 4),
 }  # a configuration that is longer than the velocity
 
 
@@ -37,16 +42,34 @@ def bits(value):
     if isinstance(value, np.ndarray):
         return value.dtype, value.shape, value.tobytes()
     if dataclasses.is_dataclass(value):
-        return type(value), [(field.name, bits(getattr(value, field.name))) for field in dataclasses.fields(value)]
-    parts = value.items() if isinstance(value, dict) else value if isinstance(value, tuple | list) else None
+        return type(value), [
+            (field.name, bits(getattr(value, field.name))) for field in dataclasses.fields(value)
+        ]
+    parts = (
+        value.items()
+        if isinstance(value, dict)
+        else value
+        if isinstance(value, tuple | list)
+        else None
+    )
     return type(value), value if parts is None else [bits(part) for part in parts]
 
 
-@pytest.mark.parametrize("shape", [
-    {}, {"contacts": 0, "impacts": 0}, {"tool_dofs": (0, 0)}, {"tool_dofs": (1, 3)}, {"complete": False}, TURNED,
-    {"energy": {}, "effects": ()}, {"remarks": ("chosen",), "distrust": ("it sank é", "it flew")},
-    {"steps": 5000, "contacts": 20000}, {"v": np.array([[np.nan, -0.0, np.inf]] * 21)},
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "shape",
+    [
+        {},
+        {"contacts": 0, "impacts": 0},
+        {"tool_dofs": (0, 0)},
+        {"tool_dofs": (1, 3)},
+        {"complete": False},
+        TURNED,
+        {"energy": {}, "effects": ()},
+        {"remarks": ("chosen",), "distrust": ("it sank é", "it flew")},
+        {"steps": 5000, "contacts": 20000},
+        {"v": np.array([[np.nan, -0.0, np.inf]] * 21)},
+    ],
+)
 def test_a_run_comes_back_bit_for_bit(tmp_path, shape):
     run = made_run(**shape)
     assert bits(read_run(write_run(tmp_path / "run.h5", run))) == bits(run)
@@ -55,7 +78,9 @@ def test_a_run_comes_back_bit_for_bit(tmp_path, shape):
 def test_a_run_saves_itself_and_replaces_a_file_only_if_asked(tmp_path):
     first, other = made_run(), made_run(seed=1)
     for run, replace, kept in ((first, False, first), (other, False, first), (other, True, other)):
-        assert content_hash(read_run(run.save(tmp_path / "run.h5", replace=replace))) == content_hash(kept)
+        assert content_hash(
+            read_run(run.save(tmp_path / "run.h5", replace=replace))
+        ) == content_hash(kept)
 
 
 def test_the_content_hash_is_that_of_the_results_alone(tmp_path):
@@ -73,13 +98,25 @@ def test_xarray_opens_it_with_units_and_dimensions_and_numbers_are_packed(tmp_pa
     run = made_run()
     path = write_run(tmp_path / "run.h5", run)
     with xarray.open_datatree(path, engine="h5netcdf") as tree:
-        assert set(tree.children) >= {"scene", "law", "trajectory", "steps", "contacts", "impacts", "energy"}
+        assert set(tree.children) >= {
+            "scene",
+            "law",
+            "trajectory",
+            "steps",
+            "contacts",
+            "impacts",
+            "energy",
+        }
         for node in tree.subtree:
             for name, variable in node.dataset.data_vars.items():
-                assert not any(str(dim).startswith("phony") for dim in variable.dims), f"{node.path}/{name}"
+                assert not any(str(dim).startswith("phony") for dim in variable.dims), (
+                    f"{node.path}/{name}"
+                )
                 assert variable.ndim == 0 or "units" in variable.attrs, f"{node.path}/{name}"
         velocity = tree["trajectory/v"]
-        assert velocity.dims == ("time", "velocity") and velocity.attrs["units"] == "m/s, m/s, rad/s"
+        assert (
+            velocity.dims == ("time", "velocity") and velocity.attrs["units"] == "m/s, m/s, rad/s"
+        )
         np.testing.assert_array_equal(velocity.sel(velocity="peg.y"), run.v[:, 1])
         np.testing.assert_array_equal(tree["trajectory"].dataset["time"], run.time)
         assert tree["trajectory"].dataset["time"].attrs["units"] == "s"
@@ -136,13 +173,23 @@ def flipped(whole):
     return sealed(bytes(content))
 
 
-@pytest.mark.parametrize(("wrong", "said"), [
-    (None, "no such file"), (lambda whole: b"", ""), (lambda whole: whole + b"tail", ""), (lambda whole: whole[:8], ""),
-    (lambda whole: b"time,x\n0,1\n", ""), (partial(of_version, FORMAT_VERSION - 1), ""),
-    (partial(of_version, FORMAT_VERSION + 1), ""), (foreign, "not written by iapb"),
-    (lambda whole: sealed(foreign(whole)), "expected 'iapb run'"), (flipped, "filter"),  # gzip's checksum
-    (partial(edited, move), "no checksum"), (lambda whole: sealed(edited(move, whole)), "content hash"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        (None, "no such file"),
+        (lambda whole: b"", ""),
+        (lambda whole: whole + b"tail", ""),
+        (lambda whole: whole[:8], ""),
+        (lambda whole: b"time,x\n0,1\n", ""),
+        (partial(of_version, FORMAT_VERSION - 1), ""),
+        (partial(of_version, FORMAT_VERSION + 1), ""),
+        (foreign, "not written by iapb"),
+        (lambda whole: sealed(foreign(whole)), "expected 'iapb run'"),
+        (flipped, "filter"),  # gzip's checksum
+        (partial(edited, move), "no checksum"),
+        (lambda whole: sealed(edited(move, whole)), "content hash"),
+    ],
+)
 def test_other_contents_and_versions_are_refused_by_name(wrong, said, tmp_path):
     path = write_run(tmp_path / "run.h5", made_run())
     if wrong is None:
@@ -156,13 +203,27 @@ def test_other_contents_and_versions_are_refused_by_name(wrong, said, tmp_path):
 def test_provenance_is_complete(tmp_path):
     facts = collect_provenance(seeds=(3, 4))
     assert read_provenance(write_run(tmp_path / "run.h5", made_run(), provenance=facts)) == facts
-    for name in ("version", "commit", "uncommitted changes", "lock", "cpu", "blas", "numba", "seeds", "command"):
+    for name in (
+        "version",
+        "commit",
+        "uncommitted changes",
+        "lock",
+        "cpu",
+        "blas",
+        "numba",
+        "seeds",
+        "command",
+    ):
         assert facts[name]
 
 
 # What a key covers: every input, every line of code that can change a number, and no comment
 
-INPUTS = {"scene": {"name": "peg", "rate": 512}, "law": "IAPB", "settings": {"restitution": np.float64(0.0)}}
+INPUTS = {
+    "scene": {"name": "peg", "rate": 512},
+    "law": "IAPB",
+    "settings": {"restitution": np.float64(0.0)},
+}
 CODE = '''"""What it does."""
 LIMIT = 3.0  # [N]
 
@@ -174,31 +235,58 @@ def force(x):
 
 
 def test_every_input_and_the_code_enter_the_key_but_not_order_and_type():
-    changed = [INPUTS, INPUTS | {"law": "PB"}, INPUTS | {"scene": {"name": "peg", "rate": 1000}},
-               INPUTS | {"settings": {"restitution": 5e-324}}, INPUTS | {"extra": None}]  # fmt: skip
-    assert len({run_key(inputs) for inputs in changed} | {run_key(INPUTS, code="mine")}) == len(changed) + 1
-    reordered = {"settings": {"restitution": 0.0}, "law": "IAPB", "scene": {"rate": 512, "name": "peg"}}
+    changed = [
+        INPUTS,
+        INPUTS | {"law": "PB"},
+        INPUTS | {"scene": {"name": "peg", "rate": 1000}},
+        INPUTS | {"settings": {"restitution": 5e-324}},
+        INPUTS | {"extra": None},
+    ]
+    assert (
+        len({run_key(inputs) for inputs in changed} | {run_key(INPUTS, code="mine")})
+        == len(changed) + 1
+    )
+    reordered = {
+        "settings": {"restitution": 0.0},
+        "law": "IAPB",
+        "scene": {"rate": 512, "name": "peg"},
+    }
     assert run_key(reordered) == run_key(INPUTS)
     with pytest.raises(ArgumentError, match="value"):
         run_key({"law": object()})
 
 
-@pytest.mark.parametrize(("old", "new", "same"), [
-    ("What it does.", "Does it.", True), ('    """Return the force."""\n', "", True), ("  # [N]", "", True),
-    ("return 2.0 * x", "return (2.0\n            * x)", True), ("2.0", "2.5", False), ("2.0 * x", "x * 2.0", False),
-    ("@njit\n", "", False), ("LIMIT = 3.0", "LIMIT = 3", False), ("(x)", '(x="a text")', False),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("old", "new", "same"),
+    [
+        ("What it does.", "Does it.", True),
+        ('    """Return the force."""\n', "", True),
+        ("  # [N]", "", True),
+        ("return 2.0 * x", "return (2.0\n            * x)", True),
+        ("2.0", "2.5", False),
+        ("2.0 * x", "x * 2.0", False),
+        ("@njit\n", "", False),
+        ("LIMIT = 3.0", "LIMIT = 3", False),
+        ("(x)", '(x="a text")', False),
+    ],
+)
 def test_code_enters_a_key_and_words_do_not(old, new, same):
     assert old in CODE
-    assert (keys.code_hash(CODE.replace(old, new).encode()) == keys.code_hash(CODE.encode())) is same
+    assert (
+        keys.code_hash(CODE.replace(old, new).encode()) == keys.code_hash(CODE.encode())
+    ) is same
 
 
-def test_a_changed_added_or_removed_file_changes_the_key_whatever_is_remembered(tmp_path, monkeypatch):
+def test_a_changed_added_or_removed_file_changes_the_key_whatever_is_remembered(
+    tmp_path, monkeypatch
+):
     monkeypatch.setattr(keys, "_ROOT", tmp_path)
     monkeypatch.setattr(keys, "__file__", str(tmp_path / "keys.py"))
     folder = tmp_path / "engine"
     folder.mkdir()
-    with pytest.raises(ArgumentError, match="engine"):  # renamed, it would otherwise leave every key
+    with pytest.raises(
+        ArgumentError, match="engine"
+    ):  # renamed, it would otherwise leave every key
         keys.sources_hash.__wrapped__("engine")
 
     def version(**files):

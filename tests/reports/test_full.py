@@ -1,4 +1,5 @@
-"""`iapb verify --full`: what breaks a law is a test or a run, and Ctrl-C tells what was found until then."""
+"""`iapb verify --full`: what breaks a law is a test or a run, and Ctrl-C tells what was found until
+then."""
 
 import json
 from contextlib import nullcontext
@@ -30,7 +31,11 @@ def test_a_broken_resolver_is_told_with_a_test_that_fails_as_pasted(capsys):
     resolver = "verification.laws.planted:wrong_sign"
     assert main([*FULL, "--resolver", resolver, "--impacts", "20"]) == 1
     found = json.loads(capsys.readouterr().out)
-    assert not found["passed"] and found["batches"] == found["judged"] == 1 and list(found["laws"]) == [IMPACTS]
+    assert (
+        not found["passed"]
+        and found["batches"] == found["judged"] == 1
+        and list(found["laws"]) == [IMPACTS]
+    )
     [energy] = [one for one in found["counterexamples"] if one["law"] == "kinetic_energy"]
     failures = {count["law"]: count["failures"] for count in found["laws"][IMPACTS]}
     assert failures["kinetic_energy"] > 1 and energy["run"] is None
@@ -50,7 +55,9 @@ class Here:
         raise KeyboardInterrupt
 
 
-def test_ctrl_c_tells_what_was_judged_until_then_and_stores_a_run_that_breaks_a_law(capsys, monkeypatch, tmp_path):
+def test_ctrl_c_tells_what_was_judged_until_then_and_stores_a_run_that_breaks_a_law(
+    capsys, monkeypatch, tmp_path
+):
     def judged(resolver, seed, batch):
         count = LawCount("ledger")
         count.add(LawResidual("ledger", float(batch.first == 0), 0.5))

@@ -1,4 +1,5 @@
-"""Two reports compared: a planted change is found, whatever its kind; measured times are left alone."""
+"""Two reports compared: a planted change is found, whatever its kind; measured times are left
+alone."""
 
 import json
 import math
@@ -8,19 +9,42 @@ import pytest
 
 from iapb.errors import RunFileError
 from reports import cli, difference
-from reports.difference import CLOSE, DIFFERS, EXACT, ONLY_NEW, ONLY_OLD, TIMING, compare_reports, unlike
+from reports.difference import (
+    CLOSE,
+    DIFFERS,
+    EXACT,
+    ONLY_NEW,
+    ONLY_OLD,
+    TIMING,
+    compare_reports,
+    unlike,
+)
 from reports.numbers_file import NUMBERS_NAME, ReportNumbers, read_numbers, write_numbers
 from reports.show import Answer
 from verification.table import titled
 
-TABLE = titled(("method", "gain", "median [µs]", "stable", "note"),
-                (("factored", 1.5, 12.0, True, "rank 3 of 4"), ("svd", math.nan, 40.0, True, "left out"),
-                 ("pinv", math.inf, 41.0, False, "gains 2.50000e-3"), ("qr", None, 7.0, True, "x"),
-                 ("qr", 2.2e-16, 7.0, True, "x")), timed=("median [µs]",))  # fmt: skip
-SENTENCES = titled(("claim", "outcome", "sentence"), (("C07", "reproduced", "Gains 2.5e-3 at most."),),
-                    prose=("sentence",))  # fmt: skip
-REPORT = ReportNumbers({"claims/C07": TABLE, "claims": SENTENCES}, {"iapb run peg_corner": "c" * 64},
-                       {"cpu": "one", "commit": "abc"}, "quick")  # fmt: skip
+TABLE = titled(
+    ("method", "gain", "median [µs]", "stable", "note"),
+    (
+        ("factored", 1.5, 12.0, True, "rank 3 of 4"),
+        ("svd", math.nan, 40.0, True, "left out"),
+        ("pinv", math.inf, 41.0, False, "gains 2.50000e-3"),
+        ("qr", None, 7.0, True, "x"),
+        ("qr", 2.2e-16, 7.0, True, "x"),
+    ),
+    timed=("median [µs]",),
+)
+SENTENCES = titled(
+    ("claim", "outcome", "sentence"),
+    (("C07", "reproduced", "Gains 2.5e-3 at most."),),
+    prose=("sentence",),
+)
+REPORT = ReportNumbers(
+    {"claims/C07": TABLE, "claims": SENTENCES},
+    {"iapb run peg_corner": "c" * 64},
+    {"cpu": "one", "commit": "abc"},
+    "quick",
+)
 
 
 def changed(row, column, value, table="claims/C07"):
@@ -28,30 +52,56 @@ def changed(row, column, value, table="claims/C07"):
     given = REPORT.tables[table]
     rows = [list(cells) for cells in given.rows]
     rows[row][given.titles.index(column)] = value
-    return replace(REPORT, tables={**REPORT.tables, table: replace(given, rows=tuple(map(tuple, rows)))})
+    return replace(
+        REPORT, tables={**REPORT.tables, table: replace(given, rows=tuple(map(tuple, rows)))}
+    )
 
 
 def only(**tables):
     return replace(REPORT, tables=tables)
 
 
-@pytest.mark.parametrize("change", [
-    (0, "gain", 1.5 * (1 + 1e-12), CLOSE), (0, "gain", 1.5 * (1 + 1e-8), DIFFERS), (0, "gain", -1.5, DIFFERS),
-    (0, "gain", math.nan, DIFFERS), (1, "gain", 1.0, DIFFERS), (2, "gain", -math.inf, DIFFERS),
-    (0, "gain", None, ONLY_OLD), (3, "gain", 1.0, ONLY_NEW), (0, "median [µs]", 99.0, TIMING),
-    (0, "stable", False, DIFFERS), (0, "stable", 1, DIFFERS), (0, "note", "rank 2 of 4", DIFFERS),
-    (2, "note", "gains 2.50001e-3", DIFFERS), (1, "note", "solved", TIMING), (4, "gain", 4.4e-16, CLOSE),
-    (4, "gain", 1e-11, DIFFERS), (0, "sentence", "Gains 2.6e-3 at most.", difference.PROSE, "claims"),
-    (0, "outcome", "refuted", DIFFERS, "claims"), (0, "sentence", None, ONLY_OLD, "claims"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "change",
+    [
+        (0, "gain", 1.5 * (1 + 1e-12), CLOSE),
+        (0, "gain", 1.5 * (1 + 1e-8), DIFFERS),
+        (0, "gain", -1.5, DIFFERS),
+        (0, "gain", math.nan, DIFFERS),
+        (1, "gain", 1.0, DIFFERS),
+        (2, "gain", -math.inf, DIFFERS),
+        (0, "gain", None, ONLY_OLD),
+        (3, "gain", 1.0, ONLY_NEW),
+        (0, "median [µs]", 99.0, TIMING),
+        (0, "stable", False, DIFFERS),
+        (0, "stable", 1, DIFFERS),
+        (0, "note", "rank 2 of 4", DIFFERS),
+        (2, "note", "gains 2.50001e-3", DIFFERS),
+        (1, "note", "solved", TIMING),
+        (4, "gain", 4.4e-16, CLOSE),
+        (4, "gain", 1e-11, DIFFERS),
+        (0, "sentence", "Gains 2.6e-3 at most.", difference.PROSE, "claims"),
+        (0, "outcome", "refuted", DIFFERS, "claims"),
+        (0, "sentence", None, ONLY_OLD, "claims"),
+    ],
+)
 def test_a_planted_change_is_found_and_named_through_the_files(change, tmp_path):
     row, column, value, state, table = (*change, "claims/C07")[:5]
-    for name, report in (("old", REPORT), ("same", REPORT), ("new", changed(row, column, value, table))):
+    for name, report in (
+        ("old", REPORT),
+        ("same", REPORT),
+        ("new", changed(row, column, value, table)),
+    ):
         write_numbers(tmp_path / f"{name}.json", report)
     old, same, new = (read_numbers(tmp_path / f"{name}.json") for name in ("old", "same", "new"))
     found = compare_reports(old, same)
     assert {cell.state for cell in found.cells} == {EXACT, TIMING} and len(found.cells) == 28
-    assert (found.runs_same, found.runs_other, found.tables_old, found.tables_new) == (1, (), (), ())
+    assert (found.runs_same, found.runs_other, found.tables_old, found.tables_new) == (
+        1,
+        (),
+        (),
+        (),
+    )
     assert (same.runs, same.provenance, same.depth) == (REPORT.runs, REPORT.provenance, "quick")
     [cell] = [cell for cell in compare_reports(old, new).cells if repr(cell.old) != repr(cell.new)]
     assert (cell.state, cell.table, cell.column) == (state, table, column)
@@ -66,31 +116,55 @@ def test_rows_and_columns_that_one_report_lacks_shift_no_others():
     found = compare_reports(only(t=TABLE), only(t=fewer))
     assert (found.count(ONLY_OLD), found.count(DIFFERS)) == (5, 0)
     twice, other = (titled(("a", "a"), ((first, 2.0),)) for first in (1.0, 3.0))
-    assert [cell.state for cell in compare_reports(only(t=twice), only(t=other)).cells] == [DIFFERS, EXACT]
+    assert [cell.state for cell in compare_reports(only(t=twice), only(t=other)).cells] == [
+        DIFFERS,
+        EXACT,
+    ]
 
 
 def test_where_times_decide_the_rows_they_are_known_by_what_was_asked():
     def table(*sizes):
         rows = tuple(("pinv", size, 2.0 * size, True) for size in sizes)
-        return titled(("method", "contacts", "time [µs]", "stable"), rows, timed=("time [µs]",), timed_rows=True)
+        return titled(
+            ("method", "contacts", "time [µs]", "stable"),
+            rows,
+            timed=("time [µs]",),
+            timed_rows=True,
+        )
 
     found = compare_reports(only(t=table(1, 60, 300)), only(t=table(1, 300, 600)))
-    assert found.count(DIFFERS) == 0 and found.count(EXACT) == 6  # three judged cells of each of the two in common
-    assert found.count(TIMING) == 10  # the times of those two, and two rows of four cells of one alone
+    assert (
+        found.count(DIFFERS) == 0 and found.count(EXACT) == 6
+    )  # three judged cells of each of the two in common
+    assert (
+        found.count(TIMING) == 10
+    )  # the times of those two, and two rows of four cells of one alone
     with pytest.raises(ValueError, match="timed columns"):
         titled(("a",), ((1.0,),), timed=("b",))
 
 
 def test_what_keeps_runs_from_repeating_is_named():
-    assert unlike({"cpu": "a", "sources": "x", "commit": "1"}, {"cpu": "b", "sources": "y", "mujoco": "1"}) == (
-        "cpu", "sources", "mujoco")  # fmt: skip
-    one, threads, other = ({"cpu": "a", "blas": f"openblas 0.3 {kernel}", "simd": simd} for kernel, simd in
-                           (("Haswell x2", "AVX2"), ("Haswell x1", "AVX2"), ("SkylakeX x2", "AVX2 X86_V4")))
-    assert unlike(one, threads) == () and unlike(one, other) == ("BLAS kernel", "CPU features of numpy")
+    assert unlike(
+        {"cpu": "a", "sources": "x", "commit": "1"}, {"cpu": "b", "sources": "y", "mujoco": "1"}
+    ) == ("cpu", "sources", "mujoco")
+    one, threads, other = (
+        {"cpu": "a", "blas": f"openblas 0.3 {kernel}", "simd": simd}
+        for kernel, simd in (
+            ("Haswell x2", "AVX2"),
+            ("Haswell x1", "AVX2"),
+            ("SkylakeX x2", "AVX2 X86_V4"),
+        )
+    )
+    assert unlike(one, threads) == () and unlike(one, other) == (
+        "BLAS kernel",
+        "CPU features of numpy",
+    )
 
 
 def test_the_command_counts_everything_and_ends_with_1_only_where_results_differ(tmp_path, capsys):
-    more = replace(changed(0, "gain", 2.0), runs={"iapb run peg_corner": "d" * 64, "iapb run new": "e"})
+    more = replace(
+        changed(0, "gain", 2.0), runs={"iapb run peg_corner": "d" * 64, "iapb run new": "e"}
+    )
     more = replace(more, tables={"claims/C07": more.tables["claims/C07"], "extra": TABLE})
     for name, report in (("a", REPORT), ("b", changed(0, "median [µs]", 99.0)), ("c", more)):
         (tmp_path / name).mkdir()
@@ -100,17 +174,34 @@ def test_the_command_counts_everything_and_ends_with_1_only_where_results_differ
     assert "6 measured times, and what is made from them, are not judged" in capsys.readouterr().out
     assert cli.main(["report", "diff", a, f"{c}/{NUMBERS_NAME}"]) == 1
     said = " ".join(capsys.readouterr().out.split())
-    for words in ("claims/C07, row 1: factored, gain: 1.5 -> 2.0 (2.5e-01 of it)", "19 numbers and words",
-                  "18 are exactly", "1 differ", "Only in the old report: claims.", "Only in the new report: extra.",
-                  "Of 1 runs behind both, 0 are the same to the last bit; 1 are behind one only."):
+    for words in (
+        "claims/C07, row 1: factored, gain: 1.5 -> 2.0 (2.5e-01 of it)",
+        "19 numbers and words",
+        "18 are exactly",
+        "1 differ",
+        "Only in the old report: claims.",
+        "Only in the new report: extra.",
+        "Of 1 runs behind both, 0 are the same to the last bit; 1 are behind one only.",
+    ):
         assert words in said, words
     assert cli.main(["report", "diff", a, c, "--tolerance", "0.5"]) == 0
 
 
-@pytest.mark.parametrize("text", [
-    "", "[]", "{}", "null", '{"format": "other"}', "\x00", "[" * 100_000, "not JSON",
-    '{"format": "iapb numbers", "format_version": 1, "depth": "q", "runs": {}, "provenance": {}, '
-    '"tables": {"t": {"columns": ["a"], "rows": [[1, 2]]}}}'])  # fmt: skip
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "[]",
+        "{}",
+        "null",
+        '{"format": "other"}',
+        "\x00",
+        "[" * 100_000,
+        "not JSON",
+        '{"format": "iapb numbers", "format_version": 1, "depth": "q", "runs": {}, "provenance": {}, '
+        '"tables": {"t": {"columns": ["a"], "rows": [[1, 2]]}}}',
+    ],
+)
 def test_a_foreign_file_is_refused_in_one_sentence(text, tmp_path, capsys):
     path = tmp_path / NUMBERS_NAME
     path.write_text(text)
@@ -122,7 +213,8 @@ def test_a_foreign_file_is_refused_in_one_sentence(text, tmp_path, capsys):
 
 @pytest.fixture
 def remade(monkeypatch):
-    """Stand in for the hours of computing: `reproduce --check` makes the report that is put here."""
+    """Stand in for the hours of computing: `reproduce --check` makes the report that is put
+    here."""
     made, folders = [REPORT], []
 
     def make_report(out, depth):
@@ -135,17 +227,31 @@ def remade(monkeypatch):
     return made, folders
 
 
-@pytest.mark.parametrize(("other", "status", "said"), [
-    (REPORT, 0, "every number was made again"),
-    (changed(0, "median [µs]", 99.0), 0, "every number was made again"),
-    (changed(0, "gain", 1.5 + 1e-12), 0, "1 agree within 1e-09"),
-    (changed(0, "gain", 1.6), 1, "not every number"),
-    (changed(0, "gain", None), 1, "not every number"),
-    (replace(REPORT, tables={}), 1, "not every number"),
-    (replace(REPORT, runs={"iapb run peg_corner": "d" * 64}), 1, "runs must agree to the last bit"),
-    (replace(REPORT, runs={"iapb run peg_corner": "d" * 64}, provenance={"cpu": "two", "commit": "abc"}), 0,
-     "made with another cpu: numbers must agree within 1e-09"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("other", "status", "said"),
+    [
+        (REPORT, 0, "every number was made again"),
+        (changed(0, "median [µs]", 99.0), 0, "every number was made again"),
+        (changed(0, "gain", 1.5 + 1e-12), 0, "1 agree within 1e-09"),
+        (changed(0, "gain", 1.6), 1, "not every number"),
+        (changed(0, "gain", None), 1, "not every number"),
+        (replace(REPORT, tables={}), 1, "not every number"),
+        (
+            replace(REPORT, runs={"iapb run peg_corner": "d" * 64}),
+            1,
+            "runs must agree to the last bit",
+        ),
+        (
+            replace(
+                REPORT,
+                runs={"iapb run peg_corner": "d" * 64},
+                provenance={"cpu": "two", "commit": "abc"},
+            ),
+            0,
+            "made with another cpu: numbers must agree within 1e-09",
+        ),
+    ],
+)
 def test_a_report_is_checked_by_making_it_again(other, status, said, remade, tmp_path, capsys):
     write_numbers(tmp_path / NUMBERS_NAME, REPORT)
     remade[0].append(other)

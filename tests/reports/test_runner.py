@@ -1,6 +1,8 @@
-"""Runs through the store: computed once, kept, never overwritten, never half a run taken for a whole one, made again.
+"""Runs through the store: computed once, kept, never overwritten, never half a run taken for a
+whole one, made again.
 
-A run that is stopped or killed is computed again, and the command beside a run makes that run again, to the last bit.
+A run that is stopped or killed is computed again, and the command beside a run makes that run
+again, to the last bit.
 """
 
 import os
@@ -35,13 +37,19 @@ def test_a_finished_run_is_neither_computed_again_nor_overwritten_and_a_partial_
     with pytest.raises(ArgumentError, match="complete"):
         store.put(INPUTS, partial)
     assert store.get_or_run(INPUTS, lambda: run, label) is run and not place.partial.exists()
-    assert content_hash(RunStore(tmp_path).get_or_run(INPUTS, pytest.fail, label="any")) == content_hash(run)
+    assert content_hash(
+        RunStore(tmp_path).get_or_run(INPUTS, pytest.fail, label="any")
+    ) == content_hash(run)
     [path] = tmp_path.glob("*.h5")
     before = path.read_bytes()
     assert store.put(INPUTS, made_run(seed=2)) == path and path.read_bytes() == before
     (tmp_path / "other.h5").write_text("no run")
     [entry] = store.entries()
-    assert (entry.file, entry.title, entry.content_hash) == (path.name, "peg · IAPB", content_hash(run))
+    assert (entry.file, entry.title, entry.content_hash) == (
+        path.name,
+        "peg · IAPB",
+        content_hash(run),
+    )
     path.write_bytes(before[:5000])
     with pytest.raises(RunFileError, match=path.name):  # damage is reported, and left where it is
         store.get_or_run(INPUTS, pytest.fail)
@@ -84,11 +92,20 @@ def test_ctrl_c_in_a_run_stops_who_asked_for_it_and_keeps_what_was_done(tmp_path
         runner(PEG, "IAPB")
     [partial] = tmp_path.glob("*.partial")
     kept = read_run(partial)
-    assert not kept.complete and kept.stopped == INTERRUPTED and 0 < kept.steps < PEG.steps and not runner.used
+    assert (
+        not kept.complete
+        and kept.stopped == INTERRUPTED
+        and 0 < kept.steps < PEG.steps
+        and not runner.used
+    )
     runner(PEG, "IAPB", partial=True)
     assert [used.file.endswith(".partial") for used in runner.used.values()] == [True]
     runner.progress = None
-    assert runner(PEG, "IAPB").complete and computed == ["IAPB"] * 3 and not list(tmp_path.glob("*.partial"))
+    assert (
+        runner(PEG, "IAPB").complete
+        and computed == ["IAPB"] * 3
+        and not list(tmp_path.glob("*.partial"))
+    )
 
 
 def test_every_engine_run_used_before_is_certified(tmp_path):
@@ -96,7 +113,9 @@ def test_every_engine_run_used_before_is_certified(tmp_path):
     run = runner(PEG, "IAPB")
     runner(PEG, "PB")
     discs = load_scene(find_scene("two_discs")).with_values({"duration": 0.1})
-    assert len(runner(discs, "ideal").impacts.step)  # left out: a rigid step solves impulses and forces together
+    assert len(
+        runner(discs, "ideal").impacts.step
+    )  # left out: a rigid step solves impulses and forces together
     with runner.recording("a topic") as inside:
         table = exact_energy.TOPIC.checks[0].table(Study(runner))
     assert table.column("impacts") == [len(run.impacts.step)] and len(run.impacts.step) > 0
@@ -106,14 +125,21 @@ def test_every_engine_run_used_before_is_certified(tmp_path):
 # The command beside a run
 
 CHANGED = {
-    "duration": 0.4, "bodies.peg.position": [0.0205, -0.013250000000000001, 1e-7], "contact.friction": 0.1,
-    "walls.floor.normal": [0.1, -1.0], "device.delay": 1, "gravity": [0.0, 9.81], "couplings.unilateral": None,
-    "title": "it's \"quoted\": {a, b} # and more",
-}  # fmt: skip
+    "duration": 0.4,
+    "bodies.peg.position": [0.0205, -0.013250000000000001, 1e-7],
+    "contact.friction": 0.1,
+    "walls.floor.normal": [0.1, -1.0],
+    "device.delay": 1,
+    "gravity": [0.0, 9.81],
+    "couplings.unilateral": None,
+    "title": 'it\'s "quoted": {a, b} # and more',
+}
 
 
-@pytest.mark.parametrize(("values", "world", "rendering", "status"), [
-    ({"duration": 0.4}, "PB", "full", 0), (CHANGED, "IAPB", "spread", 3)])  # 3: the floor is tilted into the peg
+@pytest.mark.parametrize(
+    ("values", "world", "rendering", "status"),
+    [({"duration": 0.4}, "PB", "full", 0), (CHANGED, "IAPB", "spread", 3)],
+)  # 3: the floor is tilted into the peg
 def test_a_pasted_command_makes_the_same_run_again(values, world, rendering, status, tmp_path):
     runner = Runner(tmp_path / "one")
     runner(WHOLE.with_values(values), world, rendering)
@@ -124,8 +150,12 @@ def test_a_pasted_command_makes_the_same_run_again(values, world, rendering, sta
     assert (again.file, again.content_hash) == (used.file, used.content_hash)
 
 
-def test_every_scene_and_every_run_of_the_figures_has_a_command_and_a_scene_of_ones_own_its_file(tmp_path):
-    named, numbered = (WHOLE.with_values(parsed([f"{path}=3"])) for path in ("bodies.peg.mass", "bodies[0].mass"))
+def test_every_scene_and_every_run_of_the_figures_has_a_command_and_a_scene_of_ones_own_its_file(
+    tmp_path,
+):
+    named, numbered = (
+        WHOLE.with_values(parsed([f"{path}=3"])) for path in ("bodies.peg.mass", "bodies[0].mass")
+    )
     assert named.resolved() == numbered.resolved() != WHOLE.resolved()
     assert all(run_command(load_scene(find_scene(name)), "IAPB") for name in scene_names())
     for scene, values, world, rendering in FIGURE_RUNS.values():
@@ -145,9 +175,13 @@ def test_a_killed_run_leaves_nothing_and_is_computed_again(tmp_path):
     process = os.fork()
     if process == 0:
         Runner(tmp_path, lambda done, total: os._exit(9) if done > 512 else None)(PEG, "IAPB")
-    assert os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]) == 9 and not list(tmp_path.iterdir())
+    assert os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]) == 9 and not list(
+        tmp_path.iterdir()
+    )
     place = Runner(tmp_path).place_of(PEG, "IAPB")
-    place.path.with_name(f".{place.path.name}.1.writing").write_bytes(b"of a process killed while it wrote")
+    place.path.with_name(f".{place.path.name}.1.writing").write_bytes(
+        b"of a process killed while it wrote"
+    )
     run = Runner(tmp_path)(PEG, "IAPB")
     assert content_hash(read_run(place.path)) == content_hash(run)
 
@@ -155,7 +189,11 @@ def test_a_killed_run_leaves_nothing_and_is_computed_again(tmp_path):
 def test_a_thinned_run_has_its_own_file_and_comes_out_the_same_again(tmp_path):
     run, entry = Runner(tmp_path).fetch(PEG, "IAPB", every=10)
     whole = Runner(tmp_path)(PEG, "IAPB")
-    assert run.every == 10 and run.steps < whole.steps == run.steps_done and len(list(tmp_path.glob("*.h5"))) == 2
+    assert (
+        run.every == 10
+        and run.steps < whole.steps == run.steps_done
+        and len(list(tmp_path.glob("*.h5"))) == 2
+    )
     assert read_run(tmp_path / entry.file).every == 10
     assert cli.main(["store", "again", str(tmp_path)]) == 0 == cli.main(["certify", str(tmp_path)])
     assert cli.main(["inspect", str(tmp_path / entry.file)]) == 0

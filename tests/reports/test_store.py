@@ -47,7 +47,9 @@ def store(action, folder):
     return main(["store", action, str(folder)])
 
 
-def test_every_kind_of_file_is_told_and_a_damaged_run_is_computed_again_where_it_was_removed(filled, capsys):
+def test_every_kind_of_file_is_told_and_a_damaged_run_is_computed_again_where_it_was_removed(
+    filled, capsys
+):
     folder, (spoilt, whole) = filled / "runs", runs(filled)
     assert store("check", filled) == 0
     scene, run = shipped_scene("peg_corner", SHORT), read_run(spoilt)
@@ -59,8 +61,14 @@ def test_every_kind_of_file_is_told_and_a_damaged_run_is_computed_again_where_it
     with h5py.File(folder / "other.h5", "w") as file:
         file["x"] = 1
     assert {state.path.name: state.state for state in check_store(filled)} == {
-        spoilt.name: DAMAGED, whole.name: WHOLE, "unfinished.h5.partial": PARTIAL, ".x.h5.1.writing": LEFTOVER,
-        "text.h5": FOREIGN, "other.h5": FOREIGN, "cut.h5": DAMAGED}  # fmt: skip
+        spoilt.name: DAMAGED,
+        whole.name: WHOLE,
+        "unfinished.h5.partial": PARTIAL,
+        ".x.h5.1.writing": LEFTOVER,
+        "text.h5": FOREIGN,
+        "other.h5": FOREIGN,
+        "cut.h5": DAMAGED,
+    }
     assert store("check", filled) == 1 and "Remove a damaged run" in capsys.readouterr().out
     with pytest.raises(RunFileError):
         Runner(folder)(scene, run.world)
@@ -80,7 +88,9 @@ def test_what_another_version_wrote_is_told(filled, version, capsys):
     assert store("check", filled) == 0
     said = capsys.readouterr().out
     for path in others:
-        assert f"{path}: other version: its format has version {version}, and this iapb reads" in said
+        assert (
+            f"{path}: other version: its format has version {version}, and this iapb reads" in said
+        )
     assert store("check", others[0]) == 1
 
 
@@ -95,7 +105,9 @@ def test_again_tells_what_differs_and_goes_on_past_what_cannot_be_made_again(fil
     run = read_run(runs(filled)[0])
     energy = {**run.energy, "impact_loss": run.energy["impact_loss"] + 6e-17}
     forged = replace(run, q=run.q + 1e-15, energy=energy)
-    path = write_run(filled / "forged.h5", forged, provenance={"blas": "OpenBLAS of another processor"})
+    path = write_run(
+        filled / "forged.h5", forged, provenance={"blas": "OpenBLAS of another processor"}
+    )
     assert [one.name for one in repeat_run(path).differs] == ["trajectory/q", "energy/impact_loss"]
     assert all(0.0 < one.largest < 2e-15 for one in repeat_run(path).differs)
     write_run(filled / "mine.h5", replace(run, law="mine"))
@@ -104,14 +116,19 @@ def test_again_tells_what_differs_and_goes_on_past_what_cannot_be_made_again(fil
     said = capsys.readouterr().out
     assert "forged.h5: differs in\n" in said and "energy/impact_loss: by at most 6e-17 in " in said
     assert "stored under OpenBLAS of another processor; this is " in said and "table.h5" not in said
-    assert "mine.h5: not simulated again: law = 'mine'" in said and "2 of 4 runs came out the same." in said
+    assert (
+        "mine.h5: not simulated again: law = 'mine'" in said
+        and "2 of 4 runs came out the same." in said
+    )
 
 
 def test_a_law_of_ones_own_is_made_again_where_a_world_has_it(tmp_path, monkeypatch):
     class Mine(Penalty):
         name = "springs of mine"
 
-    monkeypatch.setitem(worlds.WORLDS, "mine", lambda rendering: worlds.World("mine", Mine(), "four-channel"))
+    monkeypatch.setitem(
+        worlds.WORLDS, "mine", lambda rendering: worlds.World("mine", Mine(), "four-channel")
+    )
     Runner(tmp_path)(shipped_scene("peg_corner", SHORT), "mine")
     path = next(tmp_path.glob("*.h5"))
     assert repeat_run(path).same
@@ -128,19 +145,39 @@ def test_everything_of_the_content_hash_is_compared():
             old = getattr(record, quantity.name)
             new = ~old if old.dtype == np.bool_ else old + old.dtype.type(1)
             other = replace(record, **{quantity.name: new})
-            others[f"{group}/{quantity.name}"] = other if record is run else replace(run, **{group: other})
-    for field, value in (("complete", False), ("dt", 0.25), ("time", np.zeros(21)), ("body_names", ("ball",))):
+            others[f"{group}/{quantity.name}"] = (
+                other if record is run else replace(run, **{group: other})
+            )
+    for field, value in (
+        ("complete", False),
+        ("dt", 0.25),
+        ("time", np.zeros(21)),
+        ("body_names", ("ball",)),
+    ):
         others[field] = replace(run, **{field: value})
     for name, one in others.items():
-        assert content_hash(one) != content_hash(run) and [each.name for each in differences(run, one)] == [name]
+        assert content_hash(one) != content_hash(run) and [
+            each.name for each in differences(run, one)
+        ] == [name]
 
 
-@pytest.mark.parametrize(("stored", "again", "how"), [
-    ([0.0, 1.0], [-0.0, 1.0], "in bits that no comparison of numbers shows (the sign of a zero, a NaN)"),
-    ([np.nan, 1.0], [np.nan, 1.5], "by at most 0.5 in 1 of 2 values"),
-    ([np.nan, 1.0], [2.0, 1.0], "by at most inf in 1 of 2 values"),
-    ([1.0], [1.0, 1.0], "is float64 (2,), was float64 (1,)"), (None, [1.0], "only simulated again"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("stored", "again", "how"),
+    [
+        (
+            [0.0, 1.0],
+            [-0.0, 1.0],
+            "in bits that no comparison of numbers shows (the sign of a zero, a NaN)",
+        ),
+        ([np.nan, 1.0], [np.nan, 1.5], "by at most 0.5 in 1 of 2 values"),
+        ([np.nan, 1.0], [2.0, 1.0], "by at most inf in 1 of 2 values"),
+        ([1.0], [1.0, 1.0], "is float64 (2,), was float64 (1,)"),
+        (None, [1.0], "only simulated again"),
+    ],
+)
 def test_a_difference_says_how_large_it_is(stored, again, how):
-    pair = [made_run(energy={} if values is None else {"kinetic": np.array(values)}) for values in (stored, again)]
+    pair = [
+        made_run(energy={} if values is None else {"kinetic": np.array(values)})
+        for values in (stored, again)
+    ]
     assert [(one.name, one.how) for one in differences(*pair)] == [("energy/kinetic", how)]

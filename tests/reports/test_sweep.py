@@ -1,4 +1,5 @@
-"""Sweeps: finished points stay, the missing ones are computed, a failed one costs its row; all executors agree."""
+"""Sweeps: finished points stay, the missing ones are computed, a failed one costs its row; all
+executors agree."""
 
 import json
 import os
@@ -41,7 +42,9 @@ def done(tmp_path_factory):
 
 
 def sweep(folder, *options):
-    return main(["sweep", str(folder / "small.yaml"), "--workers", "1", "--out", str(folder), *options])
+    return main(
+        ["sweep", str(folder / "small.yaml"), "--workers", "1", "--out", str(folder), *options]
+    )
 
 
 def table(folder):
@@ -55,11 +58,21 @@ def runs(folder):
 
 def test_the_table_has_an_axis_for_each_path_and_says_what_its_runs_say(done):
     found = table(done)
-    assert found.sizes["world"] == 2 and found.energy_lost.shape == (2, 1, 1, 2, 3) and len(runs(done)) == 12
+    assert (
+        found.sizes["world"] == 2
+        and found.energy_lost.shape == (2, 1, 1, 2, 3)
+        and len(runs(done)) == 12
+    )
     assert found.energy_lost.attrs["units"] == "J" and not found.error.any()
-    elastic = found.sel({"world": "IAPB", "contact.restitution": 1.0, "bodies.striker.velocity.1": 0.1})
-    plastic = found.sel({"world": "IAPB", "contact.restitution": 0.0, "bodies.striker.velocity.1": 0.1})
-    assert plastic.energy_lost.item() > 1e-6 > abs(elastic.energy_lost.item()) and elastic.impacts == 1
+    elastic = found.sel(
+        {"world": "IAPB", "contact.restitution": 1.0, "bodies.striker.velocity.1": 0.1}
+    )
+    plastic = found.sel(
+        {"world": "IAPB", "contact.restitution": 0.0, "bodies.striker.velocity.1": 0.1}
+    )
+    assert (
+        plastic.energy_lost.item() > 1e-6 > abs(elastic.energy_lost.item()) and elastic.impacts == 1
+    )
     run = read_run(done / "small" / "runs" / plastic.file.item())
     assert run.scene_source and run.world == "IAPB"
     assert run.energy["kinetic"][-1] == plastic.kinetic_energy < run.energy["kinetic"][0]
@@ -69,7 +82,10 @@ def test_a_point_that_has_a_file_is_not_simulated_again_and_a_missing_one_is(don
     before, finished = runs(done), table(done)
     lost = done / "small" / "runs" / min(before)
     lost.unlink()
-    assert sweep(done) == 0 and "12 points, 1 of them simulated now, 0 failed" in capsys.readouterr().out
+    assert (
+        sweep(done) == 0
+        and "12 points, 1 of them simulated now, 0 failed" in capsys.readouterr().out
+    )
     after = runs(done)
     assert {name for name in before if after[name] != before[name]} == {lost.name}
     assert table(done).equals(finished)
@@ -82,11 +98,16 @@ def test_a_damaged_or_impossible_point_costs_its_own_row(done, tmp_path, capsys)
     damaged.write_bytes(content[:-100])
     assert sweep(done, "--json") == 1
     told = json.loads(capsys.readouterr().out)
-    assert told["failed"] == 1 and [damaged.name in row["error"] for row in told["points"]].count(True) == 1
+    assert (
+        told["failed"] == 1
+        and [damaged.name in row["error"] for row in told["points"]].count(True) == 1
+    )
     assert int((table(done).error != "").sum()) == 1
     damaged.write_bytes(content)
     assert sweep(done) == 0 and table(done).equals(finished)
-    (tmp_path / "small.yaml").write_text(STUDY.replace("[0, 1]", "[0, 2]").replace("[IAPB, PB]", "[IAPB]"))
+    (tmp_path / "small.yaml").write_text(
+        STUDY.replace("[0, 1]", "[0, 2]").replace("[IAPB, PB]", "[IAPB]")
+    )
     assert sweep(tmp_path) == 1
     found = table(tmp_path)
     for restitution, impacts in ((0.0, False), (2.0, True)):
@@ -114,7 +135,12 @@ def test_two_processes_and_a_cluster_give_the_same_table(done, tmp_path):
     (tmp_path / "small.yaml").write_text(STUDY)
     assert sweep(tmp_path, "--workers", "2") == 0 and table(tmp_path).equals(table(done))
     distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed")
-    options = {"n_workers": 2, "threads_per_worker": 1, "processes": False, "dashboard_address": None}
+    options = {
+        "n_workers": 2,
+        "threads_per_worker": 1,
+        "processes": False,
+        "dashboard_address": None,
+    }
     (tmp_path / "cluster").mkdir()
     (tmp_path / "cluster" / "small.yaml").write_text(STUDY)
     with distributed.LocalCluster(**options) as local:
@@ -129,9 +155,14 @@ def test_a_scheduler_that_dies_or_is_not_there_is_told_in_one_sentence(tmp_path)
     place, kept = tmp_path / "scheduler.json", 0
     where = ["--scheduler-file", str(place), "--no-dashboard"]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    roles = {"scheduler": ["--host", "127.0.0.1", "--port", "0"], "worker": ["--nthreads", "1", "--no-nanny"]}
+    roles = {
+        "scheduler": ["--host", "127.0.0.1", "--port", "0"],
+        "worker": ["--nthreads", "1", "--no-nanny"],
+    }
     master, worker = (
-        subprocess.Popen([sys.executable, "-m", f"distributed.cli.dask_{role}", *where, *more], **quiet)
+        subprocess.Popen(
+            [sys.executable, "-m", f"distributed.cli.dask_{role}", *where, *more], **quiet
+        )
         for role, more in roles.items()
     )
     try:
@@ -157,14 +188,17 @@ def test_a_worker_of_another_version_or_without_the_folder_says_so(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize(("old", "new", "said"), [
-    *((f"{name}:", f"{name}x:", f"{name}x") for name in ("scene", "worlds", "values")),
-    ("[0, 1]", "[]", "contact.restitution"),
-    ("[0, 1]", "[[0, 1]]", "contact.restitution"),
-    ("[0, 1]", f"[{'0, ' * 20_000} 1]", "at most"),
-    ("two_discs", "../two_discs.yaml", "scene"),
-    ("contact.restitution", "contact/restitution", "contact/restitution"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        *((f"{name}:", f"{name}x:", f"{name}x") for name in ("scene", "worlds", "values")),
+        ("[0, 1]", "[]", "contact.restitution"),
+        ("[0, 1]", "[[0, 1]]", "contact.restitution"),
+        ("[0, 1]", f"[{'0, ' * 20_000} 1]", "at most"),
+        ("two_discs", "../two_discs.yaml", "scene"),
+        ("contact.restitution", "contact/restitution", "contact/restitution"),
+    ],
+)
 def test_a_mistake_is_told_with_its_place(old, new, said, tmp_path):
     path = tmp_path / "study.yaml"
     path.write_text(STUDY.replace(old, new))

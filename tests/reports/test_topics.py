@@ -1,4 +1,5 @@
-"""Two topics from their runs to their sentences: the hard cases, and the energy books of the scenes."""
+"""Two topics from their runs to their sentences: the hard cases, and the energy books of the
+scenes."""
 
 from dataclasses import replace
 
@@ -26,17 +27,24 @@ def test_every_hard_case_is_a_record_with_a_row_for_each_method(tmp_path, monkey
     outcomes = [{part.name: part.sentence for part in case.parts} for case in cases]
     assert outcomes[0]["factored"] == "stable" and outcomes[1]["gram_cholesky"] == "gains energy"
     assert (cases[2].details["kind"], outcomes[2]["IAPB"]) == ("motion", "stable")
-    assert len(findings.on_hard_cases(cases).tables["every method"].rows) == sum(len(case.parts) for case in cases)
+    assert len(findings.on_hard_cases(cases).tables["every method"].rows) == sum(
+        len(case.parts) for case in cases
+    )
 
 
 def topic(runs, order=1.0):
     """The topic of the scenes made from these runs, and from residuals of this order."""
     shares = {1: 0.04, 2: 0.02, 4: 0.01}
-    rows = {"contact": map(ledger.contact_row, runs), "energy ledger": map(ledger.book_row, runs),
-            "what the books leave open": (residual_row(name, 1e-3, shares, order) for name in NAMES),
-            "books over time": (row for run in runs for row in ledger.over_time(run))}  # fmt: skip
+    rows = {
+        "contact": map(ledger.contact_row, runs),
+        "energy ledger": map(ledger.book_row, runs),
+        "what the books leave open": (residual_row(name, 1e-3, shares, order) for name in NAMES),
+        "books over time": (row for run in runs for row in ledger.over_time(run)),
+    }
     tables = {check.key: check.table_of(rows[check.key]) for check in ledger.scene_ledger.checks}
-    parts = [part for check in ledger.scene_ledger.checks for part in check.sentences(tables[check.key])]
+    parts = [
+        part for check in ledger.scene_ledger.checks for part in check.sentences(tables[check.key])
+    ]
     answer = str(ledger.scene_ledger.says(tables, parts))
     return finding_of("scene-ledger", "The scenes", "", answer, parts, tables)
 
@@ -51,7 +59,9 @@ def test_sentences_say_the_numbers_worse_records_are_judged_worse_and_strips_sho
     assert "4 scenes, 3 of them three-dimensional" in found.answer
     impacts = found.tables["contact"].column("impacts")
     strips = scenes.strips(found.tables["books over time"])
-    for strip, book, struck in zip(strips, found.tables["energy ledger"].records(), impacts, strict=True):
+    for strip, book, struck in zip(
+        strips, found.tables["energy ledger"].records(), impacts, strict=True
+    ):
         gap = strip.layers.sum(axis=0)[-1] - strip.line[-1]
         left_open = book["residual: motion"] + book["residual: springs"]
         assert gap == pytest.approx(left_open, abs=1e-9 * book["energy exchanged"])

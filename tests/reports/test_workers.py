@@ -1,4 +1,5 @@
-"""Worker processes: deaf to Ctrl-C from their first moment, ended with the work, and a killed one is said."""
+"""Worker processes: deaf to Ctrl-C from their first moment, ended with the work, and a killed one
+is said."""
 
 import os
 import signal
@@ -47,8 +48,12 @@ def test_a_worker_whose_parent_was_killed_ends(tmp_path):
     script = tmp_path / "orphaning.py"
     script.write_text(ORPHANING)
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
-    with (tmp_path / "said").open("w") as said:  # a pipe would stay open as long as the worker lives
-        done = subprocess.run([sys.executable, script], stdout=said, stderr=said, check=False, env=environment)
+    with (tmp_path / "said").open(
+        "w"
+    ) as said:  # a pipe would stay open as long as the worker lives
+        done = subprocess.run(
+            [sys.executable, script], stdout=said, stderr=said, check=False, env=environment
+        )
     worker = Path("/proc") / (tmp_path / "said").read_text().strip()
     for _ in range(600):
         if not worker.exists():

@@ -15,7 +15,9 @@ from reports.store import RunStore
 from reports.store.records import write_record
 from tests.reference.fclib_files import local_file, matrix_group
 
-TIMES = int(os.environ.get("IAPB_FUZZ", "1"))  # how often each fault is done, and a multiple of the wrong inputs
+TIMES = int(
+    os.environ.get("IAPB_FUZZ", "1")
+)  # how often each fault is done, and a multiple of the wrong inputs
 
 
 @cache
@@ -30,7 +32,8 @@ def numbered(number):
 
 
 def open_store(folder):
-    """A store whose keys do not depend on the code: hashing that takes longer than what is tried here."""
+    """A store whose keys do not depend on the code: hashing that takes longer than what is tried
+    here."""
     return RunStore(folder, code="faults")
 
 
@@ -60,6 +63,10 @@ def fclib_files():
             group = file.create_group("fclib_global")
             matrix_group(group.create_group("M"), np.eye(6))
             matrix_group(group.create_group("H"), rng.normal(size=(6, 3)))
-            group["vectors/f"], group["vectors/w"], group["vectors/mu"] = np.ones(6), np.zeros(3), np.array([0.3])
+            group["vectors/f"], group["vectors/w"], group["vectors/mu"] = (
+                np.ones(6),
+                np.zeros(3),
+                np.array([0.3]),
+            )
             group["spacedim"], group["info/title"] = np.array([3], np.int32), np.bytes_("sample")
         return {each.name: each.read_bytes() for each in sorted(path.parent.iterdir())}

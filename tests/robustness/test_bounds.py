@@ -1,8 +1,10 @@
-"""No kernel reads or writes beyond its arrays, or reads what was never written; a law's count cannot make one do so.
+"""No kernel reads or writes beyond its arrays, or reads what was never written; a law's count
+cannot make one do so.
 
-`python -m tests.robustness.test_bounds N` runs all shipped scenes in the engine's worlds, and N random ones that mix
-joints, couplings, renderings, devices, forces and integrators. Interpreted kernels refuse an index beyond an array;
-compiled ones do not check it. `N twice` runs each scene twice and prints both hashes.
+`python -m tests.robustness.test_bounds N` runs all shipped scenes in the engine's worlds, and N
+random ones that mix joints, couplings, renderings, devices, forces and integrators. Interpreted
+kernels refuse an index beyond an array; compiled ones do not check it. `N twice` runs each scene
+twice and prints both hashes.
 """
 
 import os
@@ -25,8 +27,10 @@ from verification.laws.scenes import draw_scene, draw_spatial_scene
 COUNT = {"quick": 25, "deep": 1000}[os.environ.get("IAPB_HYPOTHESIS_PROFILE", "quick")]
 STEPS = 8
 pytestmark = pytest.mark.thorough
-JOINTS = {True: ("continuous", "spherical", "free_flyer", "free_flyer", "prismatic", "revolute"),
-          False: ("planar", "planar", "prismatic", "revolute")}  # by whether the scene is in space
+JOINTS = {
+    True: ("continuous", "spherical", "free_flyer", "free_flyer", "prismatic", "revolute"),
+    False: ("planar", "planar", "prismatic", "revolute"),
+}  # by whether the scene is in space
 
 
 def cases(count):
@@ -50,26 +54,42 @@ def drawn(rng):
     space = "dimensions" in values
     kind = str(rng.choice(JOINTS[space]))
     d = {"free_flyer": 6, "planar": 3, "spherical": 3}.get(kind, 1)
-    tool = {"name": "tool", "joint": kind, "mass": 0.5, "velocity": [0.3] * d,
-            "inertia": [1e-3, 2e-3, 2.5e-3] if space else 1e-3, "center_of_mass": [0.01] * (2 + space),
-            "shapes": [{"kind": "sphere" if space else "circle", "radius": 0.3}]}  # fmt: skip
+    tool = {
+        "name": "tool",
+        "joint": kind,
+        "mass": 0.5,
+        "velocity": [0.3] * d,
+        "inertia": [1e-3, 2e-3, 2.5e-3] if space else 1e-3,
+        "center_of_mass": [0.01] * (2 + space),
+        "shapes": [{"kind": "sphere" if space else "circle", "radius": 0.3}],
+    }
     if kind in ("continuous", "prismatic", "revolute") and (space or kind == "prismatic"):
         tool["axis"] = [0.0, 1.0, 0.0][: 2 + space]
     values["bodies"] = [*values["bodies"], tool]
     values["hand"] = {"body": "tool", "force": [1.0] * (6 if space else 3)}
     gains = {"stiffness": [50.0] * d, "damping": [1.0] * d}
     values["couplings"] = {"four_channel": gains, "unilateral": gains}
-    values["device"] = {"position_resolution": [1e-3] * d, "delay": int(rng.integers(0, 3)), "force_limit": [2.0] * d,
-                        "damping": [0.1] * d}  # fmt: skip
+    values["device"] = {
+        "position_resolution": [1e-3] * d,
+        "delay": int(rng.integers(0, 3)),
+        "force_limit": [2.0] * d,
+        "damping": [0.1] * d,
+    }
     scene = scene_kind(values).model_validate(values)
-    law = ImpulseAugmented(rendering=str(rng.choice(RENDERINGS))) if rng.random() < 0.7 else Penalty()
+    law = (
+        ImpulseAugmented(rendering=str(rng.choice(RENDERINGS))) if rng.random() < 0.7 else Penalty()
+    )
     return scene, law, str(rng.choice(["none", "four-channel", "unilateral"]))
 
 
 def program(*words, **environment):
     """Run this file as a program; return the lines that it prints."""
-    done = subprocess.run([sys.executable, "-m", "tests.robustness.test_bounds", str(COUNT), *words], text=True,
-                          capture_output=True, env=os.environ | {"IAPB_COMPILE": "whole"} | environment)  # fmt: skip
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.robustness.test_bounds", str(COUNT), *words],
+        text=True,
+        capture_output=True,
+        env=os.environ | {"IAPB_COMPILE": "whole"} | environment,
+    )
     assert done.returncode == 0, done.stderr[-2000:]
     return done.stdout.splitlines()
 
@@ -82,7 +102,9 @@ def test_runs_do_not_depend_on_what_was_in_memory_before():
     """Each scene twice in a process, and in two whose fresh memory holds other bytes."""
     one, other = (program("twice", MALLOC_PERTURB_=byte) for byte in ("1", "165"))
     hashes = [line.split()[-2:] for line in one[:-1]]
-    assert one == other and len(hashes) >= COUNT and all(first == second for first, second in hashes)
+    assert (
+        one == other and len(hashes) >= COUNT and all(first == second for first, second in hashes)
+    )
 
 
 class Overcounting:
@@ -99,7 +121,9 @@ class Overcounting:
         return made
 
 
-@pytest.mark.parametrize("law", [Overcounting(contacts=200), Overcounting(contacts=-1), Overcounting(impacts=10**6)])
+@pytest.mark.parametrize(
+    "law", [Overcounting(contacts=200), Overcounting(contacts=-1), Overcounting(impacts=10**6)]
+)
 def test_a_count_beyond_its_buffer_is_named(law):
     with pytest.raises(ArgumentError, match="the law 'overcounting' returned"):
         simulate(load_scene(find_scene("peg_corner")), law, steps=3)
@@ -110,7 +134,9 @@ if __name__ == "__main__":
     done = 0
     for name, scene, law, gains in cases(int(sys.argv[1])):
         try:
-            runs = [simulate(scene, law, coupling_of(scene, gains), steps=STEPS) for _ in sys.argv[1:]]
+            runs = [
+                simulate(scene, law, coupling_of(scene, gains), steps=STEPS) for _ in sys.argv[1:]
+            ]
             print(name, *map(content_hash, runs), flush=True)
         except IapbError as stop:
             print(f"{name}: {stop}")

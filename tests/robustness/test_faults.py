@@ -1,8 +1,9 @@
-"""What may happen to a store, and commands killed while they write: nothing finished is lost or damaged.
+"""What may happen to a store, and commands killed while they write: nothing finished is lost or
+damaged.
 
-Each fault is `fault(folder, rng)`, done once; an assertion fails if the store does not survive it. A kill is survived
-if no result is damaged and no finished one is gone. The same command is started again in what the kill left, and in the
-end has the content of a run that nobody disturbed.
+Each fault is `fault(folder, rng)`, done once; an assertion fails if the store does not survive it.
+A kill is survived if no result is damaged and no finished one is gone. The same command is started
+again in what the kill left, and in the end has the content of a run that nobody disturbed.
 """
 
 import os
@@ -37,7 +38,9 @@ def must_have(folder, *numbers):
     """Check that the runs of these numbers are there as stored, and that no file is damaged."""
     for number in numbers:
         path = open_store(folder).place_of({"number": number}).path
-        assert path.is_file() and content_hash(read_run(path)) == content_hash(numbered(number)), number
+        assert path.is_file() and content_hash(read_run(path)) == content_hash(numbered(number)), (
+            number
+        )
     assert not any(state.state == DAMAGED for state in check_store(folder))
 
 
@@ -49,7 +52,8 @@ def in_child(work, *arguments):
 
 
 def killed_writer(folder, rng):
-    """Let a process write, kill it at a random moment, and look at what it had said was finished."""
+    """Let a process write, kill it at a random moment, and look at what it had said was
+    finished."""
     sample_run()
     writer = in_child(write_for_ever, folder)
     time.sleep(float(rng.uniform(0.0, LONGEST)))
@@ -71,7 +75,9 @@ def full_disk(folder, rng):
     limit, said = int(rng.uniform(0.0, 0.99) * put(folder).stat().st_size), folder / "said"
 
     def write_with_limit():
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # a write past the limit fails, as on a full disk
+        signal.signal(
+            signal.SIGXFSZ, signal.SIG_IGN
+        )  # a write past the limit fails, as on a full disk
         most = resource.getrlimit(resource.RLIMIT_FSIZE)[1]
         resource.setrlimit(resource.RLIMIT_FSIZE, (limit, most))
         try:
@@ -96,16 +102,23 @@ def forbidden_folder(folder, rng):
 def rival_writers(folder, rng):
     """Two processes store the same runs; afterwards each run is there once, whole."""
     sample_run()
-    writers = [in_child(lambda: [put(folder, number) for number in range(RUNS)] and None) for _ in range(2)]
+    writers = [
+        in_child(lambda: [put(folder, number) for number in range(RUNS)] and None) for _ in range(2)
+    ]
     for writer in writers:
         writer.join()
         assert writer.exitcode == 0
     must_have(folder, *range(RUNS))
-    assert {state.state for state in check_store(folder)} == {WHOLE} and len(open_store(folder).entries()) == RUNS
+    assert {state.state for state in check_store(folder)} == {WHOLE} and len(
+        open_store(folder).entries()
+    ) == RUNS
 
 
-@pytest.mark.parametrize("fault", [killed_writer, full_disk, forbidden_folder, rival_writers],
-                         ids=lambda fault: fault.__name__)  # fmt: skip
+@pytest.mark.parametrize(
+    "fault",
+    [killed_writer, full_disk, forbidden_folder, rival_writers],
+    ids=lambda fault: fault.__name__,
+)
 def test_nothing_finished_is_lost(fault, tmp_path):
     rng = np.random.default_rng(0)
     for attempt in range(2 * TIMES):
@@ -117,14 +130,22 @@ def hashes(folder):
     """Content hash of each finished run; no file may be damaged."""
     states = check_store(folder)
     assert not any(state.state == DAMAGED for state in states)
-    return {state.path.name: read_entry(state.path).content_hash for state in states
-            if state.state == WHOLE and is_run(state.path)}  # fmt: skip
+    return {
+        state.path.name: read_entry(state.path).content_hash
+        for state in states
+        if state.state == WHOLE and is_run(state.path)
+    }
 
 
 def call(words, folder):
     """Run a command silently in a folder, as a process group of its own, and end the process."""
     os.setsid()
-    with chdir(folder), Path(os.devnull).open("w") as nowhere, redirect_stdout(nowhere), redirect_stderr(nowhere):
+    with (
+        chdir(folder),
+        Path(os.devnull).open("w") as nowhere,
+        redirect_stdout(nowhere),
+        redirect_stderr(nowhere),
+    ):
         os._exit(main(list(words)))
 
 
@@ -156,7 +177,8 @@ def test_a_killed_command_loses_nothing_finished_and_runs_again(name, tmp_path):
 
 def test_a_writer_in_place_would_be_seen(tmp_path, monkeypatch):
     def careless(folder):
-        """The planted fault: straight into the target, unsynced and unsealed, said to be finished beforehand."""
+        """The planted fault: straight into the target, unsynced and unsealed, said to be finished
+        beforehand."""
         with open_store(folder).place_of({"number": 0}, "sample").path.open("wb") as file:
             (folder / "finished").write_text("0\n")
             while True:

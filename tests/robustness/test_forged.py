@@ -1,4 +1,5 @@
-"""Files of others, made to exhaust memory, crash a library, mislead, show other files or order a terminal about.
+"""Files of others, made to exhaust memory, crash a library, mislead, show other files or order a
+terminal about.
 
 Each is refused in one sentence, in little memory and time.
 """
@@ -44,7 +45,9 @@ def command(*words):
 
 
 def apart(*words, act=command):
-    """Run a command line (or `act`) in a process of its own, which may crash; return its status and what it said."""
+    """Run a command line (or `act`) in a process of its own, which may crash; return its status and
+    what it said."""
+
     def work(pipe):
         said = io.StringIO()
         with redirect_stdout(said), redirect_stderr(said):
@@ -58,7 +61,9 @@ def apart(*words, act=command):
             except BaseException as error:
                 status, _ = -1, said.write(f"Traceback {error!r}")
         grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) << 10
-        pipe.send((status, said.getvalue() if grown < MOST else f"Traceback: took {grown >> 20} MB"))
+        pipe.send(
+            (status, said.getvalue() if grown < MOST else f"Traceback: took {grown >> 20} MB")
+        )
 
     ours, theirs = get_context("fork").Pipe()
     child = get_context("fork").Process(target=work, args=(theirs,))
@@ -124,7 +129,9 @@ def packed_twice(file):
 def huge_chunk(file):
     """Few values stated; a chunk that unpacks to 2 GB."""
     del file["trajectory/q"]
-    dataset = file.create_dataset("trajectory/q", (3,), "u1", chunks=(1 << 20,), maxshape=(None,), compression="gzip")
+    dataset = file.create_dataset(
+        "trajectory/q", (3,), "u1", chunks=(1 << 20,), maxshape=(None,), compression="gzip"
+    )
     packer = zlib.compressobj(9)
     content = b"".join(packer.compress(bytes(1 << 24)) for _ in range(128)) + packer.flush()
     dataset.id.write_direct_chunk((0,), content)
@@ -136,6 +143,7 @@ def far_offsets(file):
 
 def replaced(name, value):
     """Return an attack that puts something else in the place of a part of a run."""
+
     def attack(file):
         new = value(file) if callable(value) else value
         del file[name]
@@ -145,17 +153,29 @@ def replaced(name, value):
 
 
 ATTACKS = {  # by name: the attack, and what the refusal says
-    "external link": (replaced("scene/name", lambda file: h5py.ExternalLink(private(file), "/secret")), "another file"),
-    "linked group": (replaced("scene", lambda file: h5py.ExternalLink(private(file), "/")), "link to another file"),
+    "external link": (
+        replaced("scene/name", lambda file: h5py.ExternalLink(private(file), "/secret")),
+        "another file",
+    ),
+    "linked group": (
+        replaced("scene", lambda file: h5py.ExternalLink(private(file), "/")),
+        "link to another file",
+    ),
     "soft link": (replaced("scene/name", h5py.SoftLink("/law/name")), "soft link"),
-    "external storage": (external_storage, "stored in another file"), "virtual": (virtual, "put together"),
-    "packed twice": (packed_twice, ""), "huge chunk": (huge_chunk, ""),
-    "far offsets": (far_offsets, ""), "short": (replaced("steps/impulse", lambda file: file["steps/impulse"][:3]), ""),
+    "external storage": (external_storage, "stored in another file"),
+    "virtual": (virtual, "put together"),
+    "packed twice": (packed_twice, ""),
+    "huge chunk": (huge_chunk, ""),
+    "far offsets": (far_offsets, ""),
+    "short": (replaced("steps/impulse", lambda file: file["steps/impulse"][:3]), ""),
     "deep JSON": (replaced("scene/resolved", "[" * 100_000), ""),
     "no scene": (replaced("scene/resolved", '{"name": "x", "bodies": 7}'), ""),
-    "no text": (replaced("scene/name", np.array(b"\xff\xfe\x00\x80", h5py.string_dtype("utf-8", 4))), ""),
+    "no text": (
+        replaced("scene/name", np.array(b"\xff\xfe\x00\x80", h5py.string_dtype("utf-8", 4))),
+        "",
+    ),
     "two lines": (replaced("scene/name", "peg\nNothing wrong was found."), ""),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", ATTACKS)
@@ -173,7 +193,9 @@ def test_a_forged_run_is_refused_by_every_reader_and_shows_no_other_file(name, t
     refused("store", "check", store, status=int(name != "no scene"))
 
 
-def test_many_references_to_one_text_are_read_within_the_budget_which_can_be_raised_and_lowered(tmp_path):
+def test_many_references_to_one_text_are_read_within_the_budget_which_can_be_raised_and_lowered(
+    tmp_path,
+):
     path = write_run(tmp_path / "texts.h5", sample_run())
     assert read_run(path, budget=1 << 30).steps == sample_run().steps
     with pytest.raises(RunFileError, match="budget"):
@@ -203,9 +225,11 @@ def test_what_is_odd_is_read_or_refused(tmp_path):
 
 def test_problem_files_npz_and_robots_cannot_ask_for_any_memory_nor_show_another_file(tmp_path):
     (tmp_path / "x").mkdir()
-    changes = {"a": ("vectors/q", {"shape": 4000, "dtype": "S1000000"}, "cannot be read"),
-               "b": ("vectors/q", {"shape": 10**8, "dtype": "f8"}, "cannot be read"),
-               "c": ("vectors/mu", None, "vectors/mu is a link to another file")}  # fmt: skip
+    changes = {
+        "a": ("vectors/q", {"shape": 4000, "dtype": "S1000000"}, "cannot be read"),
+        "b": ("vectors/q", {"shape": 10**8, "dtype": "f8"}, "cannot be read"),
+        "c": ("vectors/mu", None, "vectors/mu is a link to another file"),
+    }
     for name, (part, new, told) in changes.items():
         path = tmp_path / "x" / f"{name}.hdf5"
         path.write_bytes(fclib_files()["local.hdf5"])
@@ -221,14 +245,22 @@ def test_problem_files_npz_and_robots_cannot_ask_for_any_memory_nor_show_another
         for name in ("mass_matrix", "v_minus", "v_plus"):
             with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
                 np.lib.format.write_array_header_1_0(
-                    member, {"descr": "<f8", "fortran_order": False, "shape": (100_000_000, 1)})
+                    member, {"descr": "<f8", "fortran_order": False, "shape": (100_000_000, 1)}
+                )
                 for _ in range(100):
                     member.write(bytes(8_000_000))
     assert "unpacks to" in refused("certify", tmp_path / "bomb.npz")
     (tmp_path / "bomb.lcp.gz").write_bytes(gzip.compress(b"0 " * (40 << 20), 1))
     assert "MB" in refused(tmp_path / "bomb.lcp.gz", act=read_problem)
     robots = [{"name": f"r{k}", "urdf": "absent.urdf"} for k in range(1000)]
-    scene = {"name": "s", "dimensions": 3, "rate": 100, "duration": 1, "bodies": [], "robots": robots}
+    scene = {
+        "name": "s",
+        "dimensions": 3,
+        "rate": 100,
+        "duration": 1,
+        "bodies": [],
+        "robots": robots,
+    }
     (tmp_path / "s.yaml").write_text(json.dumps(scene))
     assert "at most 100 robots" in refused("run", tmp_path / "s.yaml")
 
@@ -238,40 +270,81 @@ def test_a_pipe_is_refused_and_not_waited_for_and_odd_encodings_are_refused(tmp_
     for name in ("pipe.h5", "pipe.npz", "pipe.lcp", "pipe.yaml", "arm.urdf"):
         os.mkfifo(name)
     Path("scene.yaml").write_text(
-        "{name: s, dimensions: 3, rate: 100, duration: 1, bodies: [], robots: [{name: a, urdf: arm.urdf}]}")
-    for line in ("inspect pipe.h5", "store check pipe.h5", "store again pipe.h5",
-                 "run scene.yaml", "run pipe.yaml", "sweep pipe.yaml", "report diff pipe.h5 pipe.h5"):
+        "{name: s, dimensions: 3, rate: 100, duration: 1, bodies: [], robots: [{name: a, urdf: arm.urdf}]}"
+    )
+    for line in (
+        "inspect pipe.h5",
+        "store check pipe.h5",
+        "store again pipe.h5",
+        "run scene.yaml",
+        "run pipe.yaml",
+        "sweep pipe.yaml",
+        "report diff pipe.h5 pipe.h5",
+    ):
         assert refused(*line.split()).count("\n") <= 3, line
     assert "no regular file" in refused("certify", "pipe.npz")
     assert "no regular file" in refused("pipe.lcp", act=read_problem)
-    for encoding in ("utf-7", "idna", "undefined", "rot13", "utf-32", "punycode", "base64", "no such"):
-        Path("other.urdf").write_text(f"<?xml version='1.0' encoding='{encoding}'?><robot name='r'/>")
+    for encoding in (
+        "utf-7",
+        "idna",
+        "undefined",
+        "rot13",
+        "utf-32",
+        "punycode",
+        "base64",
+        "no such",
+    ):
+        Path("other.urdf").write_text(
+            f"<?xml version='1.0' encoding='{encoding}'?><robot name='r'/>"
+        )
         with pytest.raises(ArgumentError):
             read_urdf("other.urdf")
 
 
 def process(*words, folder):
-    return subprocess.run(words, cwd=folder, capture_output=True, timeout=120, text=True,
-                          env={**os.environ, "PYTHONPATH": str(ROOT)}, stdin=subprocess.DEVNULL)  # fmt: skip
+    return subprocess.run(
+        words,
+        cwd=folder,
+        capture_output=True,
+        timeout=120,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stdin=subprocess.DEVNULL,
+    )
 
 
 FULL = "iapb: standard output: No space left on device\n"
 
 
-@pytest.mark.parametrize(("line", "status", "said"), [
-    ("IAPB scenes | true; echo ${PIPESTATUS[0]}", "0", ""),
-    ("IAPB --help | true; echo ${PIPESTATUS[0]}", "0", ""),
-    ("IAPB inspect run.h5 | true; echo ${PIPESTATUS[0]}", "0", ""),
-    ("IAPB inspect run.h5 >/dev/full; echo $?", "1", FULL), ("IAPB --help >/dev/full; echo $?", "1", FULL),
-    ("IAPB inspect run.h5 2>/dev/full >/dev/null; echo $?", "0", ""),
-    ("IAPB inspect absent.h5 2>/dev/full; echo $?", "1", ""), ("IAPB inspect run.h5 >&-; echo $?", "0", ""),
-    ("IAPB run peg_corner --set duration=0.01 --out out >&- 2>&-; echo $?; cat out/*.h5 | wc -c >&2", "0", "0"),
-    ("IAPB inspect run.h5 <&- >&- 2>&-; echo $?", "0", ""),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("line", "status", "said"),
+    [
+        ("IAPB scenes | true; echo ${PIPESTATUS[0]}", "0", ""),
+        ("IAPB --help | true; echo ${PIPESTATUS[0]}", "0", ""),
+        ("IAPB inspect run.h5 | true; echo ${PIPESTATUS[0]}", "0", ""),
+        ("IAPB inspect run.h5 >/dev/full; echo $?", "1", FULL),
+        ("IAPB --help >/dev/full; echo $?", "1", FULL),
+        ("IAPB inspect run.h5 2>/dev/full >/dev/null; echo $?", "0", ""),
+        ("IAPB inspect absent.h5 2>/dev/full; echo $?", "1", ""),
+        ("IAPB inspect run.h5 >&-; echo $?", "0", ""),
+        (
+            "IAPB run peg_corner --set duration=0.01 --out out >&- 2>&-; echo $?; cat out/*.h5 | wc -c >&2",
+            "0",
+            "0",
+        ),
+        ("IAPB inspect run.h5 <&- >&- 2>&-; echo $?", "0", ""),
+    ],
+)
 def test_streams_that_end_or_are_full_blame_no_file(line, status, said, tmp_path):
     write_run(tmp_path / "run.h5", sample_run())
-    done = process("bash", "-c", line.replace("IAPB", f"{sys.executable} -m reports.cli"), folder=tmp_path)
-    assert done.stdout.strip() == status and "run.h5" not in done.stderr and "Traceback" not in done.stderr, done
+    done = process(
+        "bash", "-c", line.replace("IAPB", f"{sys.executable} -m reports.cli"), folder=tmp_path
+    )
+    assert (
+        done.stdout.strip() == status
+        and "run.h5" not in done.stderr
+        and "Traceback" not in done.stderr
+    ), done
     assert done.stderr == said or (said == "0" and int(done.stderr) > 1000), done
 
 
@@ -287,20 +360,32 @@ def test_what_cannot_be_written_is_named_and_leaves_nothing_behind(tmp_path):
     with pytest.raises(RunFileError, match="pipe: cannot be written: .* in its place"):
         write_whole(tmp_path / "pipe", "text")
     assert command("certify", run, "--export", tmp_path / "enough") == 0
-    for act, words in ((command, ("certify", run, "--export", place)), (write_whole, (place, "text" * 50)),
-                       (write_run, (place, sample_run()))):
+    for act, words in (
+        (command, ("certify", run, "--export", place)),
+        (write_whole, (place, "text" * 50)),
+        (write_run, (place, sample_run())),
+    ):
         said = refused(act, *words, act=limited)
         assert f"{place.parent}/" in said and "cannot be written: File too large" in said, said
         assert list(place.parent.iterdir()) == []
 
 
 def test_ctrl_c_while_a_file_is_written_ends_the_writer(tmp_path):
-    program = ("import signal, sys, pathlib\nfrom tests.robustness.samples import put, sample_run\nsample_run()\n"
-               "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # a process in the background ignores it
-               "print('go', flush=True)\nfor number in range(10**6): put(pathlib.Path(sys.argv[1]), number)")
+    program = (
+        "import signal, sys, pathlib\nfrom tests.robustness.samples import put, sample_run\nsample_run()\n"
+        # a process in the background ignores it
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "print('go', flush=True)\nfor number in range(10**6): put(pathlib.Path(sys.argv[1]), "
+        "number)"
+    )
     for attempt in range(4):
-        child = subprocess.Popen([sys.executable, "-c", program, str(tmp_path)], cwd=ROOT, stdout=subprocess.PIPE,
-                                 stderr=subprocess.PIPE, text=True)  # fmt: skip
+        child = subprocess.Popen(
+            [sys.executable, "-c", program, str(tmp_path)],
+            cwd=ROOT,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
         assert child.stdout.readline() == "go\n"
         time.sleep(0.3 + 0.05 * attempt)
         child.send_signal(signal.SIGINT)
@@ -313,16 +398,20 @@ def test_ctrl_c_while_a_file_is_written_ends_the_writer(tmp_path):
 
 def test_no_text_or_name_of_a_file_gives_the_terminal_orders(tmp_path, capsys):
     orders = f"\x1b[8mhidden\x1b[0m \u200f\u061c\u200bx{ORDERS}"
-    path = write_run(tmp_path / f"{ORDERS}.h5", sample_run(), provenance={"commit": orders, ORDERS: "a name"})
-    terminal = (
-        f"import pty, sys; sys.exit(pty.spawn([{sys.executable!r}, '-m', 'reports.cli', 'inspect', {path.name!r}]))")
+    path = write_run(
+        tmp_path / f"{ORDERS}.h5", sample_run(), provenance={"commit": orders, ORDERS: "a name"}
+    )
+    command = [sys.executable, "-m", "reports.cli", "inspect", path.name]
+    terminal = f"import pty, sys; sys.exit(pty.spawn({command!r}))"
     assert main(["inspect", str(path)]) == 0
     shown = (*capsys.readouterr(), process(sys.executable, "-c", terminal, folder=tmp_path).stdout)
     path.write_bytes(b"no run")
     assert main(["inspect", str(path)]) == 1 and main(["store", "check", str(path)]) == 1
     (tmp_path / "bare").mkdir()
     assert "expected run files, or folders that hold some" in refused("certify", tmp_path / "bare")
-    said = refused("run", "peg_corner", "--set", "duration=0.4", "--out", tmp_path / "a\nname", status=0)
+    said = refused(
+        "run", "peg_corner", "--set", "duration=0.4", "--out", tmp_path / "a\nname", status=0
+    )
     assert "a\\nname" in said and "\nname" not in said.replace("a\\nname", "")
     for text in (*shown, *capsys.readouterr()):
         assert not set(text) & set("\x1b\x07\x9b\x08\u202e\u200f\u061c\u200b"), json.dumps(text)
@@ -338,8 +427,13 @@ def test_a_terminal_gets_colours_and_nothing_else_that_it_obeys():
 
 
 def test_without_a_folder_for_the_cache_kernels_are_compiled_in_memory_and_it_is_said():
-    program = ("import numba.core.caching as c; c.CacheImpl._locator_classes = []\n"
-               "import numpy as np; from iapb.compiled import copy_into\n"
-               "a = np.zeros(3); copy_into(a, np.ones(3)); print(a.sum())")  # fmt: skip
+    program = (
+        "import numba.core.caching as c; c.CacheImpl._locator_classes = []\n"
+        "import numpy as np; from iapb.compiled import copy_into\n"
+        "a = np.zeros(3); copy_into(a, np.ones(3)); print(a.sum())"
+    )
     done = process(sys.executable, "-c", program, folder=ROOT)
-    assert done.stdout.strip() == "3.0" and done.stderr.count("UserWarning: kernels are compiled anew") == 1
+    assert (
+        done.stdout.strip() == "3.0"
+        and done.stderr.count("UserWarning: kernels are compiled anew") == 1
+    )

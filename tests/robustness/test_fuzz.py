@@ -1,6 +1,8 @@
-"""Wrong input of every kind: read, or refused by one of iapb's errors; never a traceback, a hang or endless memory.
+"""Wrong input of every kind: read, or refused by one of iapb's errors; never a traceback, a hang or
+endless memory.
 
-Valid samples are damaged by a generator that each case seeds: bytes, texts, plain values, HDF5, and command lines.
+Valid samples are damaged by a generator that each case seeds: bytes, texts, plain values, HDF5, and
+command lines.
 """
 
 import contextlib
@@ -39,25 +41,126 @@ from tests.robustness.samples import TIMES, fclib_files, result_files
 pytestmark = pytest.mark.thorough
 
 READ, REFUSED, BROKEN = "read", "refused", "broken"
-LONGEST = 20.0  # [s] of this process's own time; a case takes milliseconds, the largest legal file a few seconds
+# [s] of this process's own time; a case takes milliseconds, the largest legal file a few seconds
+LONGEST = 20.0
 MEMORY = 4 << 30  # bytes beyond what the process has: a wrong file may not ask for more
 STEPS = 3  # of a scene that is read all the same: it must also start
 # What trips readers: signs of YAML, XML and JSON, numbers at the edges, texts that are no text.
 TOKENS = (
-    "~", "null", "true", ".nan", ".inf", "nan", "inf", "1e999", "-1", "0", "1e-400", "9" * 400, "0x1F", "1_0", "''",
-    '"', "'", "[]", "{}", "[[[[", "}", "]", "- ", ": ", "? ", "&a ", "*a", "<<: *a", "|", ">", "%YAML 1.1", "---",
-    "...", "!!python/object/apply:os.abort []", "#", "@", "`", "\t", "\r", "\n", "\n\n  ", "\x00", "\x85", "\u2028",
-    "\ufeff", "\U0001f600", '"\\uD800"', "2001-01-01", "world", "kind", "name", "e" * 3000, "<", ">", "</robot>",
-    "<![CDATA[", "]]>", "<!DOCTYPE a [<!ENTITY b 'c'>]>", "&b;", "&#0;", "<?xml version='1.1'?>", "<link/>",
-    "../../../etc/passwd", "/dev/zero", "-0", "+1", "1e308", "-1e308", "5e-324", "2147483648",
-    "-9223372036854775809", "== END ==", "(", ")",
-)  # fmt: skip
+    "~",
+    "null",
+    "true",
+    ".nan",
+    ".inf",
+    "nan",
+    "inf",
+    "1e999",
+    "-1",
+    "0",
+    "1e-400",
+    "9" * 400,
+    "0x1F",
+    "1_0",
+    "''",
+    '"',
+    "'",
+    "[]",
+    "{}",
+    "[[[[",
+    "}",
+    "]",
+    "- ",
+    ": ",
+    "? ",
+    "&a ",
+    "*a",
+    "<<: *a",
+    "|",
+    ">",
+    "%YAML 1.1",
+    "---",
+    "...",
+    "!!python/object/apply:os.abort []",
+    "#",
+    "@",
+    "`",
+    "\t",
+    "\r",
+    "\n",
+    "\n\n  ",
+    "\x00",
+    "\x85",
+    "\u2028",
+    "\ufeff",
+    "\U0001f600",
+    '"\\uD800"',
+    "2001-01-01",
+    "world",
+    "kind",
+    "name",
+    "e" * 3000,
+    "<",
+    ">",
+    "</robot>",
+    "<![CDATA[",
+    "]]>",
+    "<!DOCTYPE a [<!ENTITY b 'c'>]>",
+    "&b;",
+    "&#0;",
+    "<?xml version='1.1'?>",
+    "<link/>",
+    "../../../etc/passwd",
+    "/dev/zero",
+    "-0",
+    "+1",
+    "1e308",
+    "-1e308",
+    "5e-324",
+    "2147483648",
+    "-9223372036854775809",
+    "== END ==",
+    "(",
+    ")",
+)
 VALUES = (
-    None, True, False, 0, 1, -1, 0.0, -0.0, 1e-13, 1e-12, 1e9, -1e9, 1.1e9, 1e308, 5e-324, 10**17, "", " ", "x",
-    "world", "planar", "../x", "/", "a\x00b", "robots/six_axis_arm.urdf", [], {}, [[]], [0], [0, 0], [0, 0, 0],
-    [1e9] * 3, [0, 0, 0, 1], {"kind": "circle", "radius": 1e-12}, {"kind": "sphere", "radius": 1e9}, {"name": "peg"},
+    None,
+    True,
+    False,
+    0,
+    1,
+    -1,
+    0.0,
+    -0.0,
+    1e-13,
+    1e-12,
+    1e9,
+    -1e9,
+    1.1e9,
+    1e308,
+    5e-324,
+    10**17,
+    "",
+    " ",
+    "x",
+    "world",
+    "planar",
+    "../x",
+    "/",
+    "a\x00b",
+    "robots/six_axis_arm.urdf",
+    [],
+    {},
+    [[]],
+    [0],
+    [0, 0],
+    [0, 0, 0],
+    [1e9] * 3,
+    [0, 0, 0, 1],
+    {"kind": "circle", "radius": 1e-12},
+    {"kind": "sphere", "radius": 1e9},
+    {"name": "peg"},
     ["a"] * 50,
-)  # fmt: skip
+)
 MOST_CHANGES = 4  # per case: more, and the first mistake hides the others
 NEST = 40  # levels; a scene has seven
 
@@ -77,14 +180,29 @@ def damaged_bytes(content, other, rng):
     for _ in changes(rng):
         at, length = int(rng.integers(len(content) + 1)), int(2 ** rng.uniform(0, 8))
         before, piece, after = content[:at], content[at : at + length], content[at + length :]
-        flipped = bytes([content[at] ^ (1 << int(rng.integers(8)))]) + content[at + 1 :] if at < len(content) else b""
-        content = before + chosen(rng, [flipped, after, piece + piece + after, rng.bytes(len(piece)) + after,
-                                        bytes(len(piece)) + after, b"\xff" * len(piece) + after, b""])  # fmt: skip
+        flipped = (
+            bytes([content[at] ^ (1 << int(rng.integers(8)))]) + content[at + 1 :]
+            if at < len(content)
+            else b""
+        )
+        content = before + chosen(
+            rng,
+            [
+                flipped,
+                after,
+                piece + piece + after,
+                rng.bytes(len(piece)) + after,
+                bytes(len(piece)) + after,
+                b"\xff" * len(piece) + after,
+                b"",
+            ],
+        )
     return content
 
 
 def damaged_text(sample, other, rng):
-    """Return the text with tokens put in, lines and words lost, moved or repeated, or the end of another text."""
+    """Return the text with tokens put in, lines and words lost, moved or repeated, or the end of
+    another text."""
     packed = b"\x1f\x8b"  # the first bytes of what is compressed
     if sample.startswith(packed) or rng.random() < 0.1:
         return damaged_bytes(sample, other, rng)
@@ -94,23 +212,31 @@ def damaged_text(sample, other, rng):
         line, to = (int(rng.integers(len(lines))) for _ in range(2))
         words = lines[line].split(" ")
         words[int(rng.integers(len(words)))] = token = str(chosen(rng, TOKENS))
-        shifted = " " * int(rng.integers(1, 4)) + lines[line] if rng.random() < 0.5 else lines[line].lstrip()
-        text = chosen(rng, [
-            text[:at] + token + text[at:],
-            text[:at] + text[at + int(rng.integers(1, 30)) :],
-            text[:at] + chr(int(rng.integers(1, 0xD7FF))) + text[at:],
-            text[:at] + other[int(rng.integers(len(other) + 1)) :],
-            "\n".join([*lines[:line], " ".join(words), *lines[line + 1 :]]),
-            "\n".join([*lines[:line], shifted, *lines[line + 1 :]]),
-            "\n".join(lines[:line] + lines[line + 1 :]),
-            "\n".join([*lines[:to], lines[line], *lines[to:]]),
-        ])  # fmt: skip
+        shifted = (
+            " " * int(rng.integers(1, 4)) + lines[line]
+            if rng.random() < 0.5
+            else lines[line].lstrip()
+        )
+        text = chosen(
+            rng,
+            [
+                text[:at] + token + text[at:],
+                text[:at] + text[at + int(rng.integers(1, 30)) :],
+                text[:at] + chr(int(rng.integers(1, 0xD7FF))) + text[at:],
+                text[:at] + other[int(rng.integers(len(other) + 1)) :],
+                "\n".join([*lines[:line], " ".join(words), *lines[line + 1 :]]),
+                "\n".join([*lines[:line], shifted, *lines[line + 1 :]]),
+                "\n".join(lines[:line] + lines[line + 1 :]),
+                "\n".join([*lines[:to], lines[line], *lines[to:]]),
+            ],
+        )
     return text.encode()
 
 
 def damaged_values(sample, other, rng):
-    """Return a YAML text, half of the time as JSON, which always gets past the first look: its values (mappings, lists,
-    numbers, texts) with some replaced, lost, renamed, repeated or nested."""
+    """Return a YAML text, half of the time as JSON, which always gets past the first look: its
+    values (mappings, lists, numbers, texts) with some replaced, lost, renamed, repeated or
+    nested."""
     if rng.random() < 0.5:
         return damaged_text(sample, other, rng)
     plain = copy.deepcopy(values_of(sample))
@@ -132,7 +258,10 @@ def damaged_values(sample, other, rng):
                 nested = [nested] if rng.random() < 0.5 else {"name": nested}
             factor = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.integers(-12, 12))
             scaled = float(value) * factor if isinstance(value, int | float) else nested
-            owner[key] = chosen(rng, [taken, nested, scaled, *(copy.deepcopy(chosen(rng, VALUES)) for _ in range(2))])
+            owner[key] = chosen(
+                rng,
+                [taken, nested, scaled, *(copy.deepcopy(chosen(rng, VALUES)) for _ in range(2))],
+            )
     return json.dumps(plain).encode()
 
 
@@ -170,19 +299,35 @@ def damaged_hdf5(content, other, rng):
                 del file[name]
                 if kind == 2:
                     file.create_group(name)
-                elif isinstance(wrong, tuple):  # stated to be large, never written: a few bytes on the disk
-                    file.create_dataset(name, shape=wrong, dtype=np.float64, chunks=(1024,) * len(wrong))
+                elif isinstance(
+                    wrong, tuple
+                ):  # stated to be large, never written: a few bytes on the disk
+                    file.create_dataset(
+                        name, shape=wrong, dtype=np.float64, chunks=(1024,) * len(wrong)
+                    )
                 elif kind == 3:
                     file[name] = wrong
     return stream.getvalue()
 
 
 WRONG = (
-    np.zeros(0), np.zeros(3), np.array([-1], np.int32), np.array([2**31 - 1], np.int64), np.array([1e308, np.nan]),
-    np.array([[1.0, 2.0], [3.0, 4.0]]), np.bytes_("word"), "text \u00e9", np.array([0, 7, -3], np.int32), (2**40,),
-    (2**20, 2**20), np.array([3], np.int32), np.array([-2], np.int32), np.array([1 + 2j]), np.float64(0.5),
+    np.zeros(0),
+    np.zeros(3),
+    np.array([-1], np.int32),
+    np.array([2**31 - 1], np.int64),
+    np.array([1e308, np.nan]),
+    np.array([[1.0, 2.0], [3.0, 4.0]]),
+    np.bytes_("word"),
+    "text \u00e9",
+    np.array([0, 7, -3], np.int32),
+    (2**40,),
+    (2**20, 2**20),
+    np.array([3], np.int32),
+    np.array([-2], np.int32),
+    np.array([1 + 2j]),
+    np.float64(0.5),
     np.array([True]),
-)  # fmt: skip
+)
 
 
 # The kinds of input: samples, their damage, and who reads them
@@ -221,21 +366,35 @@ def read_results(path):
 
 
 LCP = b"2\n2 1\n1 2\n-5 -6\n"
-PROBLEMS = {"two.lcp": LCP, "two.lcp.gz": gzip.compress(LCP, mtime=0),
-            "fathi.dat": b"3\n0\n3\n3\n3\n3\n1 0 0\n2 1 0\n2 2 1\n-8 -6 -4\nexample of Fathi\n"}  # fmt: skip
+PROBLEMS = {
+    "two.lcp": LCP,
+    "two.lcp.gz": gzip.compress(LCP, mtime=0),
+    "fathi.dat": b"3\n0\n3\n3\n3\n3\n1 0 0\n2 1 0\n2 2 1\n-8 -6 -4\nexample of Fathi\n",
+}
 LINES = (
     "run peg_corner --set duration=0.05",
     "run two_discs --world PB --set duration=0.05 --set contact.restitution=0.5",
     "run peg_corner --rendering scale --set duration=0.05 --set bodies.peg.position=[0.03,-0.01,0]",
-    "effects peg_corner --world ideal", "effects arm_obstacles", "inspect run.h5 --impacts 1", "schema",
-    "store check results", "sweep no_study --workers 1",
+    "effects peg_corner --world ideal",
+    "effects arm_obstacles",
+    "inspect run.h5 --impacts 1",
+    "schema",
+    "store check results",
+    "sweep no_study --workers 1",
     "reproduce --figure fig99",
-)  # fmt: skip
-LONG = {"verify", "prove", "reproduce", "compare", "bench"}  # a line that might start long work gets a wrong word
+)
+LONG = {
+    "verify",
+    "prove",
+    "reproduce",
+    "compare",
+    "bench",
+}  # a line that might start long work gets a wrong word
 
 
 def run_line(path):
-    """Run a line where the files are that it may name; it must end with 0, 1 or 2, and say why where it is not 0."""
+    """Run a line where the files are that it may name; it must end with 0, 1 or 2, and say why
+    where it is not 0."""
     words = path.read_text(errors="replace").split(" ")  # words may be empty or have other blanks
     words = [word for word in words if word != "--debug"]  # which shows a traceback
     words += ["--no-such-option"] if set(words) & LONG else []
@@ -244,10 +403,16 @@ def run_line(path):
         for name, content in result_files().items():
             (place / name).write_bytes(content)
     out, error = io.StringIO(), io.StringIO()
-    with contextlib.chdir(path.parent), contextlib.redirect_stdout(out), contextlib.redirect_stderr(error):
+    with (
+        contextlib.chdir(path.parent),
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(error),
+    ):
         status = main(words)
     said, complained = out.getvalue().strip(), error.getvalue().strip()
-    assert status in (0, 1, 2) and "Traceback" not in complained and (not status or said or complained), (words, status)
+    assert (
+        status in (0, 1, 2) and "Traceback" not in complained and (not status or said or complained)
+    ), (words, status)
     if status:
         raise IapbError(complained)
 
@@ -259,9 +424,14 @@ KINDS = {  # samples, damage, reader, and how many cases are tried: fewer where 
     "LCP files": (lambda: PROBLEMS, damaged_text, read_problem, 200),
     "FCLIB files": (fclib_files, damaged_hdf5, read_problem, 60),
     "run files and tables": (result_files, damaged_bytes, read_results, 200),
-    "sealed run files": (result_files, lambda *given: sealed(damaged_hdf5(*given)), read_results, 60),
+    "sealed run files": (
+        result_files,
+        lambda *given: sealed(damaged_hdf5(*given)),
+        read_results,
+        60,
+    ),
     "command lines": (lambda: {line: line.encode() for line in LINES}, damaged_text, run_line, 60),
-}  # fmt: skip
+}
 
 
 class TooLong(BaseException):
@@ -273,6 +443,7 @@ def judge(read, path, content):
 
     LONGEST is counted in this process's own time: a busy machine is no hang.
     """
+
     def stop(*_):
         raise TooLong
 
@@ -298,7 +469,9 @@ def judge(read, path, content):
 def bounded_memory():
     soft, hard = resource.getrlimit(resource.RLIMIT_AS)
     most = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize() + MEMORY
-    resource.setrlimit(resource.RLIMIT_AS, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
+    resource.setrlimit(
+        resource.RLIMIT_AS, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard)
+    )
     yield
     resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
 
@@ -314,7 +487,11 @@ def test_wrong_input_is_read_or_refused_and_valid_input_is_read(kind, tmp_path):
         assert outcome == READ or kind == "command lines", words  # some lines are wrong on purpose
 
     @settings(max_examples=cases * TIMES, phases=[Phase.generate], database=None)
-    @given(st.integers(0, 2**64 - 1), st.sampled_from(sorted(samples)), st.sampled_from(sorted(samples)))
+    @given(
+        st.integers(0, 2**64 - 1),
+        st.sampled_from(sorted(samples)),
+        st.sampled_from(sorted(samples)),
+    )
     def damaged(seed, name, other):
         content = damage(samples[name], samples[other], np.random.default_rng(seed))
         outcome, words = judge(read, tmp_path / name, content)
@@ -327,6 +504,7 @@ def test_wrong_input_is_read_or_refused_and_valid_input_is_read(kind, tmp_path):
 
 def test_a_careless_reader_is_caught(tmp_path, monkeypatch):
     """The planted faults: a traceback and a swallowed hang; and one that is right."""
+
     def careless(path):
         raise KeyError(path.name)
 

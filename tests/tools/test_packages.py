@@ -1,4 +1,5 @@
-"""The trial of the packages asks for the lowest versions allowed, and what it runs in each environment runs."""
+"""The trial of the packages asks for the lowest versions allowed, and what it runs in each
+environment runs."""
 
 import json
 
@@ -9,7 +10,9 @@ from tools.packages import TRIAL, VERDICT, lowest
 
 def test_the_lowest_versions_are_those_of_the_project_and_of_the_extras_inside_an_extra():
     assert {"numpy", "pydantic"} <= {one.partition("==")[0] for one in lowest("")}
-    assert {"numpy", "h5py", "hypothesis", "cvxpy"} <= {one.partition("==")[0] for one in lowest("all")}
+    assert {"numpy", "h5py", "hypothesis", "cvxpy"} <= {
+        one.partition("==")[0] for one in lowest("all")
+    }
 
 
 @pytest.mark.parametrize(("code", "says"), [(TRIAL, "bits"), (VERDICT, "passed")])

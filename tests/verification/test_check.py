@@ -1,4 +1,5 @@
-"""The runner: a fault costs its row, its sentence or its table alone; columns follow from the rows; topics conclude."""
+"""The runner: a fault costs its row, its sentence or its table alone; columns follow from the rows;
+topics conclude."""
 
 import pytest
 
@@ -37,34 +38,68 @@ def concluded(*checks, says=lambda tables, parts: "All said."):
 def test_a_case_that_raises_costs_its_row_alone():
     found = concluded(a_check())
     assert found.tables["sizes"].rows == (("a", 1), ("bb", 2)) and found.verdict == NOT_COMPUTED
-    assert [(one.case, one.error) for one in found.failures] == [("sizes, broken", "ZeroDivisionError")]
-    assert (found.parts[0].sentence, found.parts[0].verdict) == ("Cases are short. 2 of 2 rows of the table hold.",
-                                                                 REPRODUCED)  # fmt: skip
+    assert [(one.case, one.error) for one in found.failures] == [
+        ("sizes, broken", "ZeroDivisionError")
+    ]
+    assert (found.parts[0].sentence, found.parts[0].verdict) == (
+        "Cases are short. 2 of 2 rows of the table hold.",
+        REPRODUCED,
+    )
     assert found.answer == "All said. 1 case failed."
 
 
 def test_a_sentence_or_a_check_that_raises_costs_itself_alone():
-    found = concluded(a_check(cases=("a",), says=lambda table: table.nothing), a_check("second", cases=None),
-                      a_check("third", cases=("ccc",)), says=lambda tables, parts: tables["second"])  # fmt: skip
-    assert [one.case for one in found.failures] == ["second, all of it", "sizes, its sentence", "the answer"]
+    found = concluded(
+        a_check(cases=("a",), says=lambda table: table.nothing),
+        a_check("second", cases=None),
+        a_check("third", cases=("ccc",)),
+        says=lambda tables, parts: tables["second"],
+    )
+    assert [one.case for one in found.failures] == [
+        "second, all of it",
+        "sizes, its sentence",
+        "the answer",
+    ]
     assert {"sizes", "third"} <= set(found.tables) and "second" not in found.tables
-    assert [part.verdict for part in found.parts] == [REFUTED, NOT_COMPUTED] and found.answer == "3 cases failed."
+    assert [part.verdict for part in found.parts] == [
+        REFUTED,
+        NOT_COMPUTED,
+    ] and found.answer == "3 cases failed."
 
 
 def test_a_table_made_before_is_not_made_again():
     calls = []
-    checks = a_check(cases=("a",)), a_check("second", cases=("a",), prepare=lambda study, cases: calls.append(cases))
-    topic = Topic(key="topic", title="Topic", question="?", checks=checks, says=lambda tables, parts: "All said.")
+    checks = (
+        a_check(cases=("a",)),
+        a_check("second", cases=("a",), prepare=lambda study, cases: calls.append(cases)),
+    )
+    topic = Topic(
+        key="topic",
+        title="Topic",
+        question="?",
+        checks=checks,
+        says=lambda tables, parts: "All said.",
+    )
     given = lambda *_: None  # noqa: E731
     known = topic.measure(checks[1:], given, "quick", given, [])
-    assert topic(given, "quick", given, known) == topic(given, "quick", given) and calls == [("a",), ("a",)]
+    assert topic(given, "quick", given, known) == topic(given, "quick", given) and calls == [
+        ("a",),
+        ("a",),
+    ]
 
 
 def test_columns_follow_from_the_rows_and_have_their_marks():
-    table = a_check(conditions=["case"], timed=["size [m]"], digits=2, note="A note.", holds=None).table_of(
-        [{"case": "a", "holds": True}, {"size [m]": 2.0, "case": "b"}])  # fmt: skip
+    table = a_check(
+        conditions=["case"], timed=["size [m]"], digits=2, note="A note.", holds=None
+    ).table_of([{"case": "a", "holds": True}, {"size [m]": 2.0, "case": "b"}])
     case, size = table.columns
-    assert (case.condition, case.timed, size.unit, size.timed, table.digits) == (True, False, "m", True, 2)
+    assert (case.condition, case.timed, size.unit, size.timed, table.digits) == (
+        True,
+        False,
+        "m",
+        True,
+        2,
+    )
     assert table.note == "A note." and table.timed == ("size [m]", "holds")
 
 
@@ -72,13 +107,18 @@ def test_a_row_may_have_its_own_outcome():
     check = a_check(holds=None)
     table = check.table_of([{"case": "a", "holds": True}, {"case": "b"}])
     assert table.holds == (True, None) and table.keys == ["case"]
-    assert check.table_of([{"case": "a"}]).holds == () and check.sentences(check.table_of([{"case": "a"}])) == ()
+    assert (
+        check.table_of([{"case": "a"}]).holds == ()
+        and check.sentences(check.table_of([{"case": "a"}])) == ()
+    )
 
 
 @pytest.mark.parametrize(("rule", "verdict"), [(None, REFUTED), (verdict_of_trials, MIXED)])
 def test_the_verdict_of_a_sentence_follows_from_the_rows(rule, verdict):
     check = a_check(says=lambda table: "Said.", **({"rule": rule} if rule else {}))
-    (said,) = check.sentences(check.table_of([{"case": "a", "size [m]": 1}, {"case": "cccc", "size [m]": 4}]))
+    (said,) = check.sentences(
+        check.table_of([{"case": "a", "size [m]": 1}, {"case": "cccc", "size [m]": 4}])
+    )
     assert said.verdict == verdict and not said.timed
     assert check.sentences(check.table_of([]))[0].verdict == NOT_TESTABLE
 
@@ -86,14 +126,23 @@ def test_the_verdict_of_a_sentence_follows_from_the_rows(rule, verdict):
 def test_a_check_may_say_more_than_one_part():
     parts = [Part("First.", "", "one"), Part("2 of 2 hold.", REPRODUCED)]
     found = concluded(a_check(cases=("a",), says=lambda table: parts))
-    assert [(part.name, part.verdict) for part in found.parts] == [("one", REPRODUCED), ("", REPRODUCED)]
+    assert [(part.name, part.verdict) for part in found.parts] == [
+        ("one", REPRODUCED),
+        ("", REPRODUCED),
+    ]
 
 
 def test_several_rows_of_a_case_and_shared_results():
     calls = []
     study = Study()
-    check = Check(key="rows", question="", cases=lambda study: (1, 2),
-                  row=lambda study, n: [{"n": study.once("sum", lambda: calls.append(n) or 5) + k} for k in range(n)])
+    check = Check(
+        key="rows",
+        question="",
+        cases=lambda study: (1, 2),
+        row=lambda study, n: [
+            {"n": study.once("sum", lambda: calls.append(n) or 5) + k} for k in range(n)
+        ],
+    )
     assert check.table(study).rows == ((5,), (5,), (6,)) and calls == [1]
     with pytest.raises(ArgumentError, match="depth"):
         Study(depth="deep")

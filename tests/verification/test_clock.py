@@ -1,4 +1,5 @@
-"""The clock: warm, in random order, compiled code within compiled code; what fails takes no further turns."""
+"""The clock: warm, in random order, compiled code within compiled code; what fails takes no further
+turns."""
 
 from __future__ import annotations
 
@@ -8,7 +9,9 @@ from verification.clock import sampler, seconds, take_turns
 from verification.finding import Failure
 
 
-def test_contestants_take_turns_in_an_order_that_changes_and_the_first_round_does_not_count() -> None:
+def test_contestants_take_turns_in_an_order_that_changes_and_the_first_round_does_not_count() -> (
+    None
+):
     order: list[str] = []
 
     def contestant(name: str) -> float:
@@ -20,13 +23,19 @@ def test_contestants_take_turns_in_an_order_that_changes_and_the_first_round_doe
     assert len(rounds) == 21 and {"".join(sorted(each)) for each in rounds} == {"abc"}
     assert len(set(rounds)) == 6  # every order occurs
     assert [times.rounds for times in found.values()] == [20] * 3
-    assert min(min(times.samples) for times in found.values()) > 3.0  # the warm round had 1, 2 and 3
+    assert (
+        min(min(times.samples) for times in found.values()) > 3.0
+    )  # the warm round had 1, 2 and 3
 
 
 def test_a_contestant_that_raises_is_a_failure_and_leaves() -> None:
     failures: list[Failure] = []
-    found = take_turns({(1, "good"): lambda: 1.0, (2, "bad"): lambda: 1.0 / 0.0}, 3, failures=failures)
-    assert list(found) == [(1, "good")] and [failure.error for failure in failures] == ["ZeroDivisionError"]
+    found = take_turns(
+        {(1, "good"): lambda: 1.0, (2, "bad"): lambda: 1.0 / 0.0}, 3, failures=failures
+    )
+    assert list(found) == [(1, "good")] and [failure.error for failure in failures] == [
+        "ZeroDivisionError"
+    ]
     with pytest.raises(ZeroDivisionError):
         take_turns({"bad": lambda: 1.0 / 0.0}, 3)
 
@@ -52,7 +61,8 @@ def test_a_call_that_repeats_itself_is_not_called_from_python() -> None:
 
 
 def test_the_first_call_does_not_say_how_many_a_sample_needs() -> None:
-    """It loads machine code, and what takes so long once would be timed alone and with cold caches ever after."""
+    """It loads machine code, and what takes so long once would be timed alone and with cold caches
+    ever after."""
     calls: list[int] = []
 
     def call() -> None:

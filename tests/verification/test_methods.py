@@ -1,4 +1,5 @@
-"""The compared methods give v⁺ = −e v where every coordinate is stopped, and v where nothing touches."""
+"""The compared methods give v⁺ = −e v where every coordinate is stopped, and v where nothing
+touches."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """The claims ledger: each claim of the paper as a Check with a verdict over a range of conditions.
 
-`check_claims` checks the claims; `CLAIMS` maps each id to its claim. A claim is a `Check` named after its id, in one of
-the files of `_FILES`.
+`check_claims` checks the claims; `CLAIMS` maps each id to its claim. A claim is a `Check` named
+after its id, in one of the files of `_FILES`.
 """
 
 from __future__ import annotations
@@ -26,10 +26,14 @@ _FILES = (
     "socket",
     "speed",
 )
-CLAIMS: dict[str, Check] = dict(sorted(
-    (name, claim) for file in _FILES for name, claim in vars(import_module(f"{__name__}.{file}")).items()
-    if isinstance(claim, Check) and name == claim.key
-))
+CLAIMS: dict[str, Check] = dict(
+    sorted(
+        (name, claim)
+        for file in _FILES
+        for name, claim in vars(import_module(f"{__name__}.{file}")).items()
+        if isinstance(claim, Check) and name == claim.key
+    )
+)
 
 
 def check_claims(
@@ -39,7 +43,8 @@ def check_claims(
     progress: Callable[[int, int, str], None] | None = None,
     **options: Any,
 ) -> tuple[Finding, ...]:
-    """Check the paper's claims and return one finding each; exceptions are recorded as failures of their claim.
+    """Check the paper's claims and return one finding each; exceptions are recorded as failures of
+    their claim.
 
     Parameters
     ----------
@@ -63,7 +68,10 @@ def check_claims(
         say(done, len(chosen), name)
         failures: list[Failure] = []
         study.failures = failures
-        result = attempt(name, partial(CLAIMS[name].finding, study), failures) or CLAIMS[name].not_computed()
+        result = (
+            attempt(name, partial(CLAIMS[name].finding, study), failures)
+            or CLAIMS[name].not_computed()
+        )
         results.append(with_failures(result, failures))
     say(len(chosen), len(chosen), "")
     return tuple(results)

@@ -1,4 +1,5 @@
-"""C07: a plastic collision removes all or part of the kinetic energy, depending on the geometry (Fig. 3)."""
+"""C07: a plastic collision removes all or part of the kinetic energy, depending on the geometry
+(Fig. 3)."""
 
 from __future__ import annotations
 
@@ -25,11 +26,14 @@ ROUNDING = 1e-12  # of one 2 x 2 factorization, as a share of an energy of about
 
 
 def arm_of(study: Study, reading: str) -> Mechanism:
-    """Return the mechanism of the arm: uniform rods as in the scene, or the whole mass of each link at its end."""
+    """Return the mechanism of the arm: uniform rods as in the scene, or the whole mass of each link
+    at its end."""
     scene = study.scene("two_link_arm_a")
     if reading == POINTS:
         for name in ("upper_arm", "forearm"):
-            scene = scene.with_values({f"bodies.{name}.center_of_mass": [1.0, 0.0], f"bodies.{name}.inertia": 0.0})
+            scene = scene.with_values(
+                {f"bodies.{name}.center_of_mass": [1.0, 0.0], f"bodies.{name}.inertia": 0.0}
+            )
     return System(scene).mechanism
 
 
@@ -43,42 +47,70 @@ def strike(arm: Mechanism, place: float, angle: float, restitution: float) -> di
     mass = arm.mass_matrix(q)
     after_velocity = resolve_impact(mass, rows, VELOCITY, restitution).velocity
     before, after = (0.5 * float(v @ mass @ v) for v in (VELOCITY, after_velocity))
-    return {"energy before [J]": before, "energy after [J]": after, "share lost": (before - after) / before}
+    return {
+        "energy before [J]": before,
+        "energy after [J]": after,
+        "share lost": (before - after) / before,
+    }
 
 
 def _struck(study: Study, case: tuple[str, float, float]) -> dict[str, Any]:
     reading, angle, place = case
     expected = ALL if case == (RODS, 0.0, PLACE_B) else SOME
-    return {"reading": reading, "place along the second link [m]": place, "angle of the second link [rad]": angle,
-            "expected": expected} | strike(arm_of(study, reading), place, angle, 0.0)  # fmt: skip
+    return {
+        "reading": reading,
+        "place along the second link [m]": place,
+        "angle of the second link [rad]": angle,
+        "expected": expected,
+    } | strike(arm_of(study, reading), place, angle, 0.0)
 
 
 def _holds(row: Row) -> bool | None:
-    """Return whether the impact removes all energy where that is expected, and only a part of it elsewhere."""
+    """Return whether the impact removes all energy where that is expected, and only a part of it
+    elsewhere."""
     share = row["share lost"]
-    return bool(abs(share - 1.0) <= ROUNDING if row["expected"] == ALL else ROUNDING < share < 1.0 - ROUNDING)
+    return bool(
+        abs(share - 1.0) <= ROUNDING
+        if row["expected"] == ALL
+        else ROUNDING < share < 1.0 - ROUNDING
+    )
 
 
 def _says(table: Table) -> str:
     texts, shares = [], table.column("share lost")
     for reading in (RODS, POINTS):
         straight = table.where(reading=reading, **{"angle of the second link": 0.0})
-        a, b = (straight.where(**{"place along the second link": p}).records()[0] for p in (PLACE_A, PLACE_B))
-        texts.append(f"{reading}: {a['energy before']:.4f} J before, {a['energy after']:.6f} J left at A, "
-                     f"{b['energy after']:.1e} J at B")  # fmt: skip
-    return (f"The contact is {PLACE_A} m (A) or {PLACE_B} m (B) from the elbow, and its normal is across the arm. The "
-            "paper does not say where A and B are measured from, nor which way the normal points; we chose both. "
-            f"With {'. With '.join(texts)}. Over all contact places and joint angles the share of energy lost is "
-            f"{min(shares):.3f} to {max(shares):.3f}.")
+        a, b = (
+            straight.where(**{"place along the second link": p}).records()[0]
+            for p in (PLACE_A, PLACE_B)
+        )
+        texts.append(
+            f"{reading}: {a['energy before']:.4f} J before, {a['energy after']:.6f} J left at A, "
+            f"{b['energy after']:.1e} J at B"
+        )
+    return (
+        f"The contact is {PLACE_A} m (A) or {PLACE_B} m (B) from the elbow, and its normal is "
+        f"across the arm. The "
+        "paper does not say where A and B are measured from, nor which way the normal points; we "
+        "chose both. "
+        f"With {'. With '.join(texts)}. Over all contact places and joint angles the share of "
+        f"energy lost is "
+        f"{min(shares):.3f} to {max(shares):.3f}."
+    )
 
 
 C07 = Check(
-    key="C07", question="A plastic collision takes all or part of the kinetic energy, depending on the geometry.",
+    key="C07",
+    question="A plastic collision takes all or part of the kinetic energy, depending on the geometry.",
     place="Section V-A, Fig. 2 and 3",
     quantity="Share of kinetic energy lost by the two-link arm in one frictionless collision with e = 0.",
     tolerance="“All” (expected of straight rods struck at B): a share of 1 to within 1e-12, the rounding of one "
     " 2 x 2 factorization. “Part” (expected everywhere else): a smaller share.",
-    cases=lambda study: list(product((RODS, POINTS), ANGLES, PLACES)), row=_struck, holds=_holds, says=_says,
-    parts=["reading"], conditions=["place along the second link", "angle of the second link"],
+    cases=lambda study: list(product((RODS, POINTS), ANGLES, PLACES)),
+    row=_struck,
+    holds=_holds,
+    says=_says,
+    parts=["reading"],
+    conditions=["place along the second link", "angle of the second link"],
     axes=("place along the second link", "angle of the second link", "reading"),
-)  # fmt: skip
+)

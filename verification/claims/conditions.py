@@ -1,8 +1,10 @@
-"""The conditions of the peg in the corner that the paper leaves open, as ranges (paper Fig. 4, section VI).
+"""The conditions of the peg in the corner that the paper leaves open, as ranges (paper Fig. 4,
+section VI).
 
-A trial starts from a tilt, a clearance and a travel. The clearance is the distance from the wall to the peg's nearest
-corner when the hand begins to push; the travel is the same distance from the floor. The other conditions are friction,
-stiffness and damping of the walls, the collision threshold (see `Condition`), and the device's force limit.
+A trial starts from a tilt, a clearance and a travel. The clearance is the distance from the wall to
+the peg's nearest corner when the hand begins to push; the travel is the same distance from the
+floor. The other conditions are friction, stiffness and damping of the walls, the collision
+threshold (see `Condition`), and the device's force limit.
 """
 
 from __future__ import annotations
@@ -17,23 +19,42 @@ from verification.region import Region
 from verification.scenes.measures import HALF_SIZE
 
 UNITS = {
-    "tilt": "rad", "clearance": "m", "travel": "m", "friction": "", "stiffness": "N/m", "damping": "N s/m",
-    "collision_threshold": "m/s", "force_limit": "times the paper's",
-}  # fmt: skip
-START = ("tilt", "clearance", "travel", "friction", "collision_threshold")  # conditions that most claims vary
+    "tilt": "rad",
+    "clearance": "m",
+    "travel": "m",
+    "friction": "",
+    "stiffness": "N/m",
+    "damping": "N s/m",
+    "collision_threshold": "m/s",
+    "force_limit": "times the paper's",
+}
+START = (
+    "tilt",
+    "clearance",
+    "travel",
+    "friction",
+    "collision_threshold",
+)  # conditions that most claims vary
 F_LIMIT = (15.0, 15.0, 1.0)  # [N, N, N m]
 
-# The conditions that each world ignores: one run of a world serves all values of these conditions. The device's limits
-# act on PB, and on IAPB unless it renders in full.
+# The conditions that each world ignores: one run of a world serves all values of these conditions.
+# The device's limits act on PB, and on IAPB unless it renders in full.
 _RIGID_IGNORES = ("friction", "stiffness", "damping", "collision_threshold", "force_limit")
-IGNORED = {"ideal": _RIGID_IGNORES, "CBuc": _RIGID_IGNORES, "PB": ("collision_threshold",), "IAPB": ()}
+IGNORED = {
+    "ideal": _RIGID_IGNORES,
+    "CBuc": _RIGID_IGNORES,
+    "PB": ("collision_threshold",),
+    "IAPB": (),
+}
 
 
 @dataclass(frozen=True)
 class Condition:
-    """One variation of the peg scene, with the units of UNITS; friction, stiffness and damping are those of the walls.
+    """One variation of the peg scene, with the units of UNITS; friction, stiffness and damping are
+    those of the walls.
 
-    A contact collides above `collision_threshold`; `force_limit` of the device is a multiple of the paper's limit.
+    A contact collides above `collision_threshold`; `force_limit` of the device is a multiple of the
+    paper's limit.
     """
 
     tilt: float = 0.015
@@ -48,31 +69,43 @@ class Condition:
     def __str__(self) -> str:
         """Return the values that differ from the paper's start, as text."""
         default = Condition()
-        changed = (f"{name} {value:g}" for name, value in asdict(self).items() if value != getattr(default, name))
+        changed = (
+            f"{name} {value:g}"
+            for name, value in asdict(self).items()
+            if value != getattr(default, name)
+        )
         return ", ".join(changed) or "the paper's start"
 
     def seen_by(self, world: str, rendering: str) -> Condition:
         """Return the condition with the default for every value that the world ignores."""
-        ignored = (*IGNORED[world], *(["force_limit"] if (world, rendering) == ("IAPB", "full") else []))
+        ignored = (
+            *IGNORED[world],
+            *(["force_limit"] if (world, rendering) == ("IAPB", "full") else []),
+        )
         return replace(self, **{name: getattr(Condition(), name) for name in ignored})
 
     def row(self, *names: str) -> dict[str, float]:
         """Return these values of the condition as cells of a row, by default those of START."""
-        return {f"{name} [{UNITS[name]}]" if UNITS[name] else name: getattr(self, name) for name in names or START}
+        return {
+            f"{name} [{UNITS[name]}]" if UNITS[name] else name: getattr(self, name)
+            for name in names or START
+        }
 
     def place(self, scene: Scene) -> Scene:
         """Return the scene with the values of this condition."""
         c, s = abs(np.cos(self.tilt)), abs(np.sin(self.tilt))
         x = self.clearance + HALF_SIZE[0] * c + HALF_SIZE[1] * s
         y = -(self.travel + HALF_SIZE[0] * s + HALF_SIZE[1] * c)
-        return scene.with_values({
-            "bodies.peg.position": [float(x), float(y), self.tilt],
-            "contact.friction": self.friction,
-            "contact.stiffness": self.stiffness,
-            "contact.damping": self.damping,
-            "contact.approach_velocity": self.collision_threshold,
-            "device.force_limit": [self.force_limit * limit for limit in F_LIMIT],
-        })  # fmt: skip
+        return scene.with_values(
+            {
+                "bodies.peg.position": [float(x), float(y), self.tilt],
+                "contact.friction": self.friction,
+                "contact.stiffness": self.stiffness,
+                "contact.damping": self.damping,
+                "contact.approach_velocity": self.collision_threshold,
+                "device.force_limit": [self.force_limit * limit for limit in F_LIMIT],
+            }
+        )
 
 
 TILTS = {
@@ -81,11 +114,13 @@ TILTS = {
 }
 CLEARANCES = {"quick": (0.003, 0.010, 0.020), "full": (0.002, 0.005, 0.010, 0.015, 0.020, 0.030)}
 TRAVELS = {"quick": (0.002, 0.020), "full": (0.001, 0.002, 0.004, 0.016, 0.020, 0.030)}
-# Evenly spaced tilts, a subset of the full ones (most of which are small): they show how results depend on the grid.
+# Evenly spaced tilts, a subset of the full ones (most of which are small): they show how results
+# depend on the grid.
 EVEN_TILTS = tuple(n / 20 for n in range(8))
 FRICTIONS = (0.1, 0.3)
-# With 1e-6 every approaching contact collides, as in the paper. An existing contact that the hand pushes slowly into
-# its wall also approaches, at up to F_h / B = 0.5 N / 50 N s/m = 10 mm/s: the last value excludes such contacts.
+# With 1e-6 every approaching contact collides, as in the paper. An existing contact that the hand
+# pushes slowly into its wall also approaches, at up to F_h / B = 0.5 N / 50 N s/m = 10 mm/s: the
+# last value excludes such contacts.
 COLLISION_THRESHOLDS = (1e-3, 1e-2)
 TIGHT = 0.3  # times the paper's limits: below the penalty forces of a hard landing
 STIFFNESSES = (250.0, 500.0, 1000.0, 2000.0, 4000.0)
@@ -93,53 +128,84 @@ DAMPINGS = (0.0, 12.5, 25.0, 50.0, 100.0)
 
 
 def start_conditions(depth: str) -> tuple[Condition, ...]:
-    """Return all tilts x clearances x thresholds, more travels at three tilts, more frictions at all tilts."""
+    """Return all tilts x clearances x thresholds, more travels at three tilts, more frictions at
+    all tilts."""
     grid = [Condition(tilt, clearance) for tilt in TILTS[depth] for clearance in CLEARANCES[depth]]
-    travels = [Condition(tilt, travel=travel) for tilt in (0.0, 0.03, 0.1) for travel in TRAVELS[depth]]
-    frictions = [Condition(tilt, friction=friction) for tilt in TILTS[depth] for friction in FRICTIONS]
-    thresholds = [replace(start, collision_threshold=speed) for start in grid for speed in COLLISION_THRESHOLDS]
+    travels = [
+        Condition(tilt, travel=travel) for tilt in (0.0, 0.03, 0.1) for travel in TRAVELS[depth]
+    ]
+    frictions = [
+        Condition(tilt, friction=friction) for tilt in TILTS[depth] for friction in FRICTIONS
+    ]
+    thresholds = [
+        replace(start, collision_threshold=speed)
+        for start in grid
+        for speed in COLLISION_THRESHOLDS
+    ]
     return tuple(dict.fromkeys(grid + travels + frictions + thresholds))
 
 
 # Every tilt and clearance of the full depth, at the paper's collision threshold.
-FULL_GRID = tuple(Condition(tilt, clearance) for tilt in TILTS["full"] for clearance in CLEARANCES["full"])
+FULL_GRID = tuple(
+    Condition(tilt, clearance) for tilt in TILTS["full"] for clearance in CLEARANCES["full"]
+)
 
 
 def limited_conditions(depth: str) -> tuple[Condition, ...]:
-    """Return the starting conditions with the paper's device limits, and some with tighter limits (C12 to C14, C16)."""
+    """Return the starting conditions with the paper's device limits, and some with tighter limits
+    (C12 to C14, C16)."""
     default = Condition()
-    starts = [start for start in start_conditions(depth) if start.collision_threshold == default.collision_threshold]
+    starts = [
+        start
+        for start in start_conditions(depth)
+        if start.collision_threshold == default.collision_threshold
+    ]
     plain = [start for start in starts if start == replace(default, tilt=start.tilt)]
     return tuple(starts + [replace(start, force_limit=TIGHT) for start in plain])
 
 
 # Range of the values tested for the start of the peg. A rigid world ignores all other conditions.
-RANGES = {name: (min(values["full"]), max(values["full"]))
-          for name, values in (("tilt", TILTS), ("clearance", CLEARANCES), ("travel", TRAVELS))}  # fmt: skip
-PATIENCE = 1000  # 1000 starts in a row miss a region with a hundredth of all starts once in 23,000 draws
+RANGES = {
+    name: (min(values["full"]), max(values["full"]))
+    for name, values in (("tilt", TILTS), ("clearance", CLEARANCES), ("travel", TRAVELS))
+}
+PATIENCE = (
+    1000  # 1000 starts in a row miss a region with a hundredth of all starts once in 23,000 draws
+)
 
 
 def drawn(tested: Sequence[Condition], region: Region, seed: int, count: int) -> list[Condition]:
-    """Return `count` conditions drawn at random inside a region and inside the range of the tested conditions.
+    """Return `count` conditions drawn at random inside a region and inside the range of the tested
+    conditions.
 
-    Tilt, clearance and travel come from one random sequence that all claims share: its first `count` starts inside the
-    region. No region was chosen from these starts. Overlapping regions share the runs of the rigid worlds, which ignore
-    all other conditions. The other conditions are drawn between the region's ends, the collision threshold uniformly in
-    its logarithm. All conditions vary at once. Values are rounded to four digits, so that every machine gets the same
-    ones. If `PATIENCE` starts in a row miss a thin region, further starts are drawn inside that region.
+    Tilt, clearance and travel come from one random sequence that all claims share: its first
+    `count` starts inside the region. No region was chosen from these starts. Overlapping regions
+    share the runs of the rigid worlds, which ignore all other conditions. The other conditions are
+    drawn between the region's ends, the collision threshold uniformly in its logarithm. All
+    conditions vary at once. Values are rounded to four digits, so that every machine gets the same
+    ones. If `PATIENCE` starts in a row miss a thin region, further starts are drawn inside that
+    region.
     """
     rng, found, missed = np.random.default_rng(seed), list[Condition](), 0
-    ends = {name: region.ends(name, [getattr(condition, name) for condition in tested]) for name in UNITS}
+    ends = {
+        name: region.ends(name, [getattr(condition, name) for condition in tested])
+        for name in UNITS
+    }
     while len(found) < count:
         shares = dict(zip(UNITS, rng.random(len(UNITS)), strict=True))
         patient = missed < PATIENCE
-        start = {name: _between(*(RANGES if patient else ends)[name], shares[name]) for name in RANGES}
+        start = {
+            name: _between(*(RANGES if patient else ends)[name], shares[name]) for name in RANGES
+        }
         if patient and not all(ends[name][0] <= start[name] <= ends[name][1] for name in RANGES):
             missed += 1
             continue
         missed = 0 if patient else missed
-        others = {name: _between(*ends[name], shares[name], by_decades=name == "collision_threshold")
-                  for name in UNITS if name not in RANGES}  # fmt: skip
+        others = {
+            name: _between(*ends[name], shares[name], by_decades=name == "collision_threshold")
+            for name in UNITS
+            if name not in RANGES
+        }
         found.append(Condition(**start, **others))
     return found
 

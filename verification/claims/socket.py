@@ -25,7 +25,10 @@ RADIUS, BALL_RADIUS = 0.2, 0.02  # [m]
 STEEP = math.radians(70.0)  # [rad] of the ball's start, from the lowest point
 LARGEST_SPEED = 1.2445  # [m/s] of a ball that rolls down from there without loss
 FACETS = (SCENE_FACETS, 18, 30, 60)  # in a right angle: 10° to 1.5° each
-CLUSTER = {"quick": (4.0,), "full": (4.0, 10.0)}  # [mm], more than the contacts at an edge are apart
+CLUSTER = {
+    "quick": (4.0,),
+    "full": (4.0, 10.0),
+}  # [mm], more than the contacts at an edge are apart
 COHERENCE = (1.1, 1.5, 2.0, 3.0, 4.0, 6.0)  # of speed × step
 DAMPING = (10.0, 20.0, 60.0)  # [N s/m]
 FRESH = 40  # sockets drawn to confirm a region
@@ -33,19 +36,22 @@ RATES = {"quick": (1000.0,), "full": (500.0, 1000.0, 2000.0)}  # [Hz]
 
 
 def edge_jump(facets: int) -> float:
-    """Distance [m] between the ball's two contacts at an edge, which is the jump of a contact from facet to facet."""
+    """Distance [m] between the ball's two contacts at an edge, which is the jump of a contact from
+    facet to facet."""
     return 2.0 * BALL_RADIUS * math.sin(0.25 * math.pi / facets)
 
 
 def socket(contact: Mapping[str, Any], rate: float, facets: int) -> Scene:
-    """Return the socket with some contact values changed, at a rate [Hz] and with facets in a right angle."""
+    """Return the socket with some contact values changed, at a rate [Hz] and with facets in a right
+    angle."""
     values: dict[str, Any] = {f"contact.{name}": value for name, value in contact.items()}
     return _faceted(facets).with_values(values | {"rate": rate})
 
 
 @cache
 def _faceted(facets: int) -> Scene:
-    """Return the shipped scene, or the same socket and start with another number of facets in a right angle."""
+    """Return the shipped scene, or the same socket and start with another number of facets in a
+    right angle."""
     scene = load_scene(find_scene(SCENE))
     if facets == SCENE_FACETS:
         return scene
@@ -69,7 +75,8 @@ def _faceted(facets: int) -> Scene:
 
 
 def count_false(run: Run) -> dict[str, int]:
-    """Count the collisions after the first contact, those in the step after one without contact, and double contacts.
+    """Count the collisions after the first contact, those in the step after one without contact,
+    and double contacts.
 
     In a round socket the ball has one contact in each step and no collision after the first.
     """
@@ -84,7 +91,8 @@ def count_false(run: Run) -> dict[str, int]:
 
 
 class Socket(NamedTuple):
-    """A ball in the socket: facets, rate [Hz], damping [N s/m], and filter distances [mm] and [of speed × step]."""
+    """A ball in the socket: facets, rate [Hz], damping [N s/m], and filter distances [mm] and [of
+    speed × step]."""
 
     facets: int
     rate: float
@@ -96,79 +104,136 @@ class Socket(NamedTuple):
     def conditions(self) -> Row:
         """The conditions as cells of a row."""
         jump = edge_jump(self.facets) * self.rate / LARGEST_SPEED
-        return {f"{JUMP} [times speed × step]": jump,
-                "coherence distance [times speed × step]": self.coherence,
-                f"{REACH} [times (jump + speed × step)]": self.coherence / (1.0 + jump),
-                "cluster distance [mm]": self.cluster, "damping [N s/m]": self.damping, "rate [Hz]": self.rate}
+        return {
+            f"{JUMP} [times speed × step]": jump,
+            "coherence distance [times speed × step]": self.coherence,
+            f"{REACH} [times (jump + speed × step)]": self.coherence / (1.0 + jump),
+            "cluster distance [mm]": self.cluster,
+            "damping [N s/m]": self.damping,
+            "rate [Hz]": self.rate,
+        }
 
 
 def _cases(study: Study) -> list[Socket]:
-    """Return both filters with every pair of distances, and each filter alone, at every facet, damping and rate."""
-    filters = [*product(CLUSTER[study.depth], COHERENCE), *product([0.0], COHERENCE[2:5:2]),
-               *product(CLUSTER[study.depth], [0.0])]  # fmt: skip
-    return [Socket(*case, *pair) for case in product(FACETS, RATES[study.depth], DAMPING) for pair in filters]
+    """Return both filters with every pair of distances, and each filter alone, at every facet,
+    damping and rate."""
+    filters = [
+        *product(CLUSTER[study.depth], COHERENCE),
+        *product([0.0], COHERENCE[2:5:2]),
+        *product(CLUSTER[study.depth], [0.0]),
+    ]
+    return [
+        Socket(*case, *pair)
+        for case in product(FACETS, RATES[study.depth], DAMPING)
+        for pair in filters
+    ]
 
 
 def _draw(study: Study, region: Region) -> list[Socket]:
-    """Draw fresh sockets with both filters, each condition uniformly in its range, and return those in the region."""
+    """Draw fresh sockets with both filters, each condition uniformly in its range, and return those
+    in the region."""
     rng = np.random.default_rng(study.seed)
     ranges = RATES[study.depth], DAMPING, CLUSTER[study.depth], COHERENCE
-    drawn = [Socket(int(rng.integers(FACETS[0], FACETS[-1] + 1)), *(
-        float(f"{rng.uniform(min(each), max(each)):.4g}") for each in ranges)) for _ in range(FRESH)]  # fmt: skip
-    return [case for case in drawn if region.contains(
-        {title.split(" [")[0]: value for title, value in case.conditions.items()})]  # fmt: skip
+    drawn = [
+        Socket(
+            int(rng.integers(FACETS[0], FACETS[-1] + 1)),
+            *(float(f"{rng.uniform(min(each), max(each)):.4g}") for each in ranges),
+        )
+        for _ in range(FRESH)
+    ]
+    return [
+        case
+        for case in drawn
+        if region.contains(
+            {title.split(" [")[0]: value for title, value in case.conditions.items()}
+        )
+    ]
 
 
 def _row(study: Study, case: Socket) -> Row:
     """Compare the ball with these filters to the ball without filters."""
-    plain, filtered = (_found(study, each) for each in (case._replace(cluster=0.0, coherence=0.0), case))
+    plain, filtered = (
+        _found(study, each) for each in (case._replace(cluster=0.0, coherence=0.0), case)
+    )
     return {
-        "part": COHERENCE_ALONE if not case.cluster else BOTH if case.coherence else CLUSTERING, **case.conditions,
+        "part": COHERENCE_ALONE if not case.cluster else BOTH if case.coherence else CLUSTERING,
+        **case.conditions,
         "false collisions without filters": plain["false collisions"],
         "false collisions": filtered["false collisions"],
         "collisions on return": filtered["on return"],
-        "doubled contacts without filters": plain["doubled contacts"], "doubled contacts": filtered["doubled contacts"],
-    }  # fmt: skip
+        "doubled contacts without filters": plain["doubled contacts"],
+        "doubled contacts": filtered["doubled contacts"],
+    }
 
 
 def _found(study: Study, case: Socket) -> dict[str, int]:
-    contact = {"damping": case.damping, "cluster_distance": 1e-3 * case.cluster,
-               "coherence_distance": case.coherence * LARGEST_SPEED / case.rate}  # fmt: skip
-    return study.once(("socket", case), lambda: count_false(
-        study.run(socket(contact, case.rate, case.facets), "IAPB", "full")))
+    contact = {
+        "damping": case.damping,
+        "cluster_distance": 1e-3 * case.cluster,
+        "coherence_distance": case.coherence * LARGEST_SPEED / case.rate,
+    }
+    return study.once(
+        ("socket", case),
+        lambda: count_false(study.run(socket(contact, case.rate, case.facets), "IAPB", "full")),
+    )
 
 
 def _says(table: Table) -> str:
     both, clustering = (table.where(part=part) for part in (BOTH, CLUSTERING))
-    reaching, short = (both.only((reach >= 1.0) is far for reach in both[REACH]) for far in (True, False))
+    reaching, short = (
+        both.only((reach >= 1.0) is far for reach in both[REACH]) for far in (True, False)
+    )
     collisions, unfiltered, doubled, all_contacts = (
-        sorted(clustering.column(f"{kind}{without}"))[len(clustering.rows) // 2] if clustering.rows else "no"
-        for kind in ("false collisions", "doubled contacts") for without in ("", " without filters"))
+        sorted(clustering.column(f"{kind}{without}"))[len(clustering.rows) // 2]
+        if clustering.rows
+        else "no"
+        for kind in ("false collisions", "doubled contacts")
+        for without in ("", " without filters")
+    )
     return (
-        "The paper's condition, a coherence distance above speed × step, is not sufficient. At an edge the contact "
-        f"jumps by {1e3 * edge_jump(max(FACETS)):.2g} to {1e3 * edge_jump(min(FACETS)):.2g} mm to the next facet, and "
-        "the distance must cover this jump as well. With both filters no false collision remains in "
-        f"{sum(reaching.decided)} of {len(reaching.decided)} trials whose coherence distance is at least jump + speed "
-        f"× step, and in {sum(short.decided)} of {len(short.decided)} trials with a shorter one. With finer facets the "
-        "jump is smaller, so the paper's condition is nearly enough. In the other trials with at least jump + speed × "
+        "The paper's condition, a coherence distance above speed × step, is not sufficient. At an "
+        "edge the contact "
+        f"jumps by {1e3 * edge_jump(max(FACETS)):.2g} to {1e3 * edge_jump(min(FACETS)):.2g} mm to "
+        f"the next facet, and "
+        "the distance must cover this jump as well. With both filters no false collision remains "
+        "in "
+        f"{sum(reaching.decided)} of {len(reaching.decided)} trials whose coherence distance is "
+        f"at least jump + speed "
+        f"× step, and in {sum(short.decided)} of {len(short.decided)} trials with a shorter one. "
+        f"With finer facets the "
+        "jump is smaller, so the paper's condition is nearly enough. In the other trials with at "
+        "least jump + speed × "
         f"step, {sum(reaching.column('false collisions'))} false collisions remain, "
-        f"{sum(reaching.column('collisions on return'))} of them when a ball returns that bounced off the facets, as "
-        f"balls do if the damping is small. Clustering alone removes duplicate contacts (median {doubled}; without "
-        f"filters {all_contacts}), but the contact that is left jumps from facet to facet and is new each time (median "
+        f"{sum(reaching.column('collisions on return'))} of them when a ball returns that bounced "
+        f"off the facets, as "
+        f"balls do if the damping is small. Clustering alone removes duplicate contacts (median "
+        f"{doubled}; without "
+        f"filters {all_contacts}), but the contact that is left jumps from facet to facet and is "
+        f"new each time (median "
         f"{collisions} false collisions; without filters {unfiltered})."
-    )  # fmt: skip
+    )
 
 
 C18 = Check(
-    key="C18", question="Clustering and temporal coherence remove false collisions.", place="Section III",
+    key="C18",
+    question="Clustering and temporal coherence remove false collisions.",
+    place="Section III",
     quantity="Number of collisions after the first contact of a ball that rolls in a faceted socket. The facets "
-    "approximate a round socket, in which a rolling ball does not collide again; so each of these is false. Speed: the "
-    "largest speed of a ball that rolls without loss. Jump to the next facet: distance between the ball's two contacts "
+    "approximate a round socket, in which a rolling ball does not collide again; so each of these "
+    "is false. Speed: the "
+    "largest speed of a ball that rolls without loss. Jump to the next facet: distance between "
+    "the ball's two contacts "
     "at an edge. Relative coherence distance: coherence distance / (jump + speed × step).",
     tolerance="No false collision remains. A trial cannot tell if there is none even without filters.",
-    cases=_cases, row=_row, says=_says, draw=_draw, parts=["part"],
-    holds=lambda row: bool(row["false collisions"] == 0) if row["false collisions without filters"] else None,
+    cases=_cases,
+    row=_row,
+    says=_says,
+    draw=_draw,
+    parts=["part"],
+    holds=lambda row: (
+        bool(row["false collisions"] == 0) if row["false collisions without filters"] else None
+    ),
     roles={COHERENCE_ALONE: BEYOND, CLUSTERING: BEYOND},
     conditions=[JUMP, "coherence distance", REACH, "cluster distance", "damping", "rate"],
     axes=(JUMP, "coherence distance", "damping"),
-)  # fmt: skip
+)

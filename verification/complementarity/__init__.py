@@ -1,1 +1,2 @@
-"""Compare IAPB with complementarity: where the laws agree, how much they differ, and what each costs."""
+"""Compare IAPB with complementarity: where the laws agree, how much they differ, and what each
+costs."""

@@ -1,18 +1,21 @@
 """Where IAPB's factored equality and the Newton LCP agree, by how much they differ, and why.
 
-This module tests three exact statements on every case. Let Δ_eq = −(1+e) P u be IAPB's change of velocity in kinetic
-coordinates (u = Lᵀv, A = J L⁻ᵀ, P projects onto the row space of A) and let C = {Aᵀp : p >= 0}. If all contacts have
-the same e, then for *any* gamma_minus:
+This module tests three exact statements on every case. Let Δ_eq = −(1+e) P u be IAPB's change of
+velocity in kinetic coordinates (u = Lᵀv, A = J L⁻ᵀ, P projects onto the row space of A) and let C =
+{Aᵀp : p >= 0}. If all contacts have the same e, then for *any* gamma_minus:
 
-1. The LCP's change is the projection of Δ_eq on the cone C (its QP is min |Aᵀp + (1+e)u|, and (I − P)u is normal to C).
-   So the laws agree if and only if some p >= 0 gives IAPB's velocity; their distance is the distance of Δ_eq from C.
-2. Both changes are (1+e) times those of the plastic impact: whether the laws agree does not depend on e.
-3. IAPB never keeps more energy than the LCP: loss_eq − loss_LCP = ½ (1−e)/(1+e) · distance². At e = 1 neither loses
-   energy.
+1. The LCP's change is the projection of Δ_eq on the cone C (its QP is min |Aᵀp + (1+e)u|, and (I −
+   P)u is normal to C). So the laws agree if and only if some p >= 0 gives IAPB's velocity; their
+   distance is the distance of Δ_eq from C.
+2. Both changes are (1+e) times those of the plastic impact: whether the laws agree does not depend
+    on e.
+3. IAPB never keeps more energy than the LCP: loss_eq − loss_LCP = ½ (1−e)/(1+e) · distance². At e =
+   1 neither loses energy.
 
-Let two contacts have unit rows with the cosine c in the kinetic metric and approach at speeds 1 and r <= 1. Both
-impulses of IAPB push if and only if r >= c, because W⁻¹ (1, r) is proportional to (1 − c r, r − c). If r < c, the
-slower contact pulls. Neither the restitution nor any other component of the velocity matters.
+Let two contacts have unit rows with the cosine c in the kinetic metric and approach at speeds 1 and
+r <= 1. Both impulses of IAPB push if and only if r >= c, because W⁻¹ (1, r) is proportional to (1 −
+c r, r − c). If r < c, the slower contact pulls. Neither the restitution nor any other component of
+the velocity matters.
 """
 
 from __future__ import annotations
@@ -35,15 +38,18 @@ from verification.finding import MIXED, REPRODUCED, Failure, Part, attempt, verd
 from verification.impacts import ImpactCase
 from verification.table import Row, Table
 
-# Two velocities count as equal below this distance (kinetic metric, relative to |v⁻|), which is also C05's tolerance.
-# Active-set solutions of well-conditioned cases reach about 1e-15; true differences are above 1e-4 in all families.
+# Two velocities count as equal below this distance (kinetic metric, relative to |v⁻|), which is
+# also C05's tolerance. Active-set solutions of well-conditioned cases reach about 1e-15; true
+# differences are above 1e-4 in all families.
 SAME = 1e-12
-# Below this distance p >= 0 reproduces the velocity: ten times SAME, so that rounding alone gives no counterexample.
+# Below this distance p >= 0 reproduces the velocity: ten times SAME, so that rounding alone gives
+# no counterexample.
 PUSHED = 1e-11
-# A contact approaches if its velocity is below minus this share of the largest contact velocity. Rounding of an exact
-# zero is smaller than this.
+# A contact approaches if its velocity is below minus this share of the largest contact velocity.
+# Rounding of an exact zero is smaller than this.
 APPROACHING = 1e-9
-# M(v⁺−v⁻) lies in range(Jᵀ) up to the rounding of two solves with M; condition numbers reach 1e4 in the families.
+# M(v⁺−v⁻) lies in range(Jᵀ) up to the rounding of two solves with M; condition numbers reach 1e4 in
+# the families.
 MOMENTUM = 1e-9
 
 
@@ -59,14 +65,18 @@ def compare_case(case: ImpactCase) -> dict[str, Any]:
     Returns
     -------
     dict
-        distance : |v⁺ − v⁺_LCP|; cone distance : distance of the impulse from {Jᵀp : p >= 0}; both in the kinetic
-        metric, relative to |v⁻|.  agrees : whether the velocities are equal; pushes : whether some p >= 0 gives v⁺;
+        distance : |v⁺ − v⁺_LCP|; cone distance : distance of the impulse from {Jᵀp : p >= 0}; both
+            in the kinetic
+        metric, relative to |v⁻|.  agrees : whether the velocities are equal; pushes : whether some
+        p >= 0 gives v⁺;
         contradicts : whether one holds without the other, which statement 1 excludes.
         extra loss : loss of kinetic energy beyond that of the LCP, as a share of KE⁻.
         defect : largest error of statements 1 and 3.
-        adhesion : "none", "artefact of the minimum norm" or "adhesive"; adhesive share : sum of the pulling impulses,
+        adhesion : "none", "artefact of the minimum norm" or "adhesive"; adhesive share : sum of the
+            pulling impulses,
         divided by the sum of all |p|.
-        approaching, approaching by the LCP : whether a contact, given or touching, still approaches.
+        approaching, approaching by the LCP : whether a contact, given or touching, still
+            approaches.
         outside : share of M(v⁺−v⁻) outside range(Jᵀ).
 
     Raises
@@ -80,15 +90,28 @@ def compare_case(case: ImpactCase) -> dict[str, Any]:
     upper, e = case.lower.T, case.restitution
     before, change = upper @ case.velocity, upper @ (v - case.velocity)
     speed = float(np.linalg.norm(before)) or 1.0
-    total, scale = float(np.abs(p).sum()), float(np.abs(problem.gamma_minus).max(initial=0.0)) or 1.0
-    rows = case.contact_jacobian if case.touching is None else np.vstack([case.contact_jacobian, case.touching])
+    total, scale = (
+        float(np.abs(p).sum()),
+        float(np.abs(problem.gamma_minus).max(initial=0.0)) or 1.0,
+    )
+    rows = (
+        case.contact_jacobian
+        if case.touching is None
+        else np.vstack([case.contact_jacobian, case.touching])
+    )
     distance = float(np.linalg.norm(upper @ (v - law))) / speed
     cone = unpushed_share(problem.factor.T, change) * float(np.linalg.norm(change)) / speed
     extra = _lost(before, change) - _lost(before, upper @ (law - case.velocity))
     near, far = sorted((distance, cone))
     return {
-        "impacts": case.family, "e": e, "redundant rows": case.redundancy, "distance": distance, "cone distance": cone,
-        "agrees": distance <= SAME, "pushes": cone <= PUSHED, "contradicts": near <= SAME and far > PUSHED,
+        "impacts": case.family,
+        "e": e,
+        "redundant rows": case.redundancy,
+        "distance": distance,
+        "cone distance": cone,
+        "agrees": distance <= SAME,
+        "pushes": cone <= PUSHED,
+        "contradicts": near <= SAME and far > PUSHED,
         "extra loss": extra,
         "defect": max(abs(distance - cone), abs(extra - (1.0 - e) / (1.0 + e) * distance**2)),
         "adhesion": adhesion(case.contact_jacobian, p, case.mass_matrix),
@@ -96,7 +119,7 @@ def compare_case(case: ImpactCase) -> dict[str, Any]:
         "approaching": bool(np.any(rows @ v < -APPROACHING * scale)),
         "approaching by the LCP": bool(np.any(rows @ law < -APPROACHING * scale)),
         "outside": _outside(problem.factor, change),
-    }  # fmt: skip
+    }
 
 
 def _lost(before: np.ndarray, change: np.ndarray) -> float:
@@ -113,11 +136,19 @@ def _outside(rows: np.ndarray, change: np.ndarray) -> float:
     return float(np.linalg.norm(change - inside)) / size
 
 
-def compare_cases(cases: Iterable[ImpactCase], failures: list[Failure] | None = None) -> list[dict[str, Any]]:
-    """Return `compare_case` of every case; `failures` receives the cases that raise an exception."""
-    found = (attempt(f"{case.family}, e = {case.restitution:g}, impact {number}",
-                     partial(compare_case, case), failures)
-             for number, case in enumerate(cases, 1))  # fmt: skip
+def compare_cases(
+    cases: Iterable[ImpactCase], failures: list[Failure] | None = None
+) -> list[dict[str, Any]]:
+    """Return `compare_case` of every case; `failures` receives the cases that raise an
+    exception."""
+    found = (
+        attempt(
+            f"{case.family}, e = {case.restitution:g}, impact {number}",
+            partial(compare_case, case),
+            failures,
+        )
+        for number, case in enumerate(cases, 1)
+    )
     return [row for row in found if row is not None]
 
 
@@ -125,7 +156,8 @@ GROUP = ("impacts", "e", "redundant rows")
 
 
 def map_rows(compared: Iterable[Row]) -> Iterator[Row]:
-    """Yield a row for each family, restitution and redundancy, in the order of their first appearance."""
+    """Yield a row for each family, restitution and redundancy, in the order of their first
+    appearance."""
     groups: dict[tuple[Any, ...], list[Row]] = {}
     for found in compared:
         groups.setdefault(tuple(found[key] for key in GROUP), []).append(found)
@@ -133,72 +165,115 @@ def map_rows(compared: Iterable[Row]) -> Iterator[Row]:
         every = {key: np.array([one[key] for one in members]) for key in members[0]}
         apart = every["distance"][~every["agrees"]]
         shares = {
-            "share that agrees": every["agrees"], "share that truly pulls": every["adhesion"] == ADHESIVE,
-            "share that pulls as chosen": every["adhesion"] == ARTEFACT, "negative share of p": every["adhesive share"],
-        }  # fmt: skip
+            "share that agrees": every["agrees"],
+            "share that truly pulls": every["adhesion"] == ADHESIVE,
+            "share that pulls as chosen": every["adhesion"] == ARTEFACT,
+            "negative share of p": every["adhesive share"],
+        }
         yield {
-            **dict(zip(GROUP, group, strict=True)), "cases": len(members),
+            **dict(zip(GROUP, group, strict=True)),
+            "cases": len(members),
             **{key: float(np.mean(values)) for key, values in shares.items()},
             "median distance where they differ": float(np.median(apart)) if len(apart) else None,
             "largest distance": float(every["distance"].max()),
             "largest extra loss of KE⁻": max(0.0, float(every["extra loss"].max())),
             "left approaching by IAPB": float(np.mean(every["approaching"])),
             "left approaching by the LCP": float(np.mean(every["approaching by the LCP"])),
-            "contradictions": int(every["contradicts"].sum()), "defect": float(every["defect"].max()),
+            "contradictions": int(every["contradicts"].sum()),
+            "defect": float(every["defect"].max()),
             "momentum outside range(Jᵀ)": float(every["outside"].max()),
-        }  # fmt: skip
+        }
 
 
 COUNTS = {"quick": 25, "full": 250}  # impacts of each family, restitution and redundancy
-SCENE_RESTITUTIONS = (None, 0.5)  # e of the scene (None), and e = 0.5, which gives more impacts, some of which differ
+SCENE_RESTITUTIONS = (
+    None,
+    0.5,
+)  # e of the scene (None), and e = 0.5, which gives more impacts, some of which differ
 
 
 def _compared(study: Study, name: str) -> Iterator[Row]:
     """Return the rows of a family or of a scene."""
-    cases = random_cases(COUNTS[study.depth], families=[name]) if name in FAMILIES else (
-        case for e in SCENE_RESTITUTIONS for case in scene_impacts(name, e))
+    cases = (
+        random_cases(COUNTS[study.depth], families=[name])
+        if name in FAMILIES
+        else (case for e in SCENE_RESTITUTIONS for case in scene_impacts(name, e))
+    )
     return map_rows(compare_cases(cases, failures=study.failures))
 
 
 def _map_says(table: Table) -> Iterator[Part]:
-    """Yield the parts on the statements, on the project's scenes, and on contacts that touch without approaching."""
+    """Yield the parts on the statements, on the project's scenes, and on contacts that touch
+    without approaching."""
     rows = table.records()
     yield Part.of(
         "With one e for all contacts, the two laws agree if and only if some p >= 0 gives IAPB's velocity",
-        f"{sum(table['contradictions'])} of {sum(table['cases']):,} impacts contradict this. If the velocities differ "
+        f"{sum(table['contradictions'])} of {sum(table['cases']):,} impacts contradict this. If "
+        f"the velocities differ "
         "by Δ in the kinetic metric, IAPB loses ½ (1−e)/(1+e) Δ² more energy than the LCP (to "
-        f"{max(table['defect']):.0e}). The largest extra loss is {max(table['largest extra loss of KE⁻']):.0%} of KE⁻",
-        "no contradiction", "", "statements")
+        f"{max(table['defect']):.0e}). The largest extra loss is "
+        f"{max(table['largest extra loss of KE⁻']):.0%} of KE⁻",
+        "no contradiction",
+        "",
+        "statements",
+    )
     if scenes := [row for row in rows if row["impacts"].startswith("scene ")]:
-        apart = sorted({row["impacts"].removeprefix("scene ") for row in scenes if row["share that agrees"] < 1.0})
+        apart = sorted(
+            {
+                row["impacts"].removeprefix("scene ")
+                for row in scenes
+                if row["share that agrees"] < 1.0
+            }
+        )
         pulling = sum(round(row["share that truly pulls"] * row["cases"]) for row in scenes)
         yield Part.of(
-            "Do the laws agree in the impacts of the project's scenes? Each scene runs with its own e and with e = "
-            f"{SCENE_RESTITUTIONS[1]:g}", f"in {pulling} of {sum(row['cases'] for row in scenes)} impacts no p >= 0 "
+            "Do the laws agree in the impacts of the project's scenes? Each scene runs with its "
+            "own e and with e = "
+            f"{SCENE_RESTITUTIONS[1]:g}",
+            f"in {pulling} of {sum(row['cases'] for row in scenes)} impacts no p >= 0 "
             "gives the velocity of (21), so an impulse must pull. The laws "
-            f"{'differ in the scenes ' + ', '.join(apart) if apart else 'agree in all scenes'}", "in all scenes",
-            MIXED if apart else REPRODUCED, "scenes")  # fmt: skip
+            f"{'differ in the scenes ' + ', '.join(apart) if apart else 'agree in all scenes'}",
+            "in all scenes",
+            MIXED if apart else REPRODUCED,
+            "scenes",
+        )
     beside = table.where(impacts="with a neighbour")
     if beside.rows:
-        ours, theirs = (float(np.mean(beside[f"left approaching by {law}"])) for law in ("IAPB", "the LCP"))
+        ours, theirs = (
+            float(np.mean(beside[f"left approaching by {law}"])) for law in ("IAPB", "the LCP")
+        )
         yield Part.of(
-            "A neighbouring contact that touches but does not approach has no row in (21). How often does it approach "
-            "after the impact?", f"in {100 * ours:.0f} % of the random impacts with such a neighbour by IAPB, "
-            f"in {100 * theirs:.0f} % by the LCP on the same rows", "never", verdict_of_share(1.0 - ours),
-            "touching")  # fmt: skip
+            "A neighbouring contact that touches but does not approach has no row in (21). How "
+            "often does it approach "
+            "after the impact?",
+            f"in {100 * ours:.0f} % of the random impacts with such a neighbour by IAPB, "
+            f"in {100 * theirs:.0f} % by the LCP on the same rows",
+            "never",
+            verdict_of_share(1.0 - ours),
+            "touching",
+        )
 
 
 MAP = Check(
-    key="map", question="With one e for all contacts, the laws agree if and only if some p >= 0 gives IAPB's velocity.",
+    key="map",
+    question="With one e for all contacts, the laws agree if and only if some p >= 0 gives IAPB's velocity.",
     cases=lambda study: [*FAMILIES, *scene_names()],
-    row=_compared, holds=lambda row: row["contradictions"] == 0 and row["defect"] <= PUSHED
-    and row["momentum outside range(Jᵀ)"] <= MOMENTUM,
-    says=_map_says, digits=3,
+    row=_compared,
+    holds=lambda row: (
+        row["contradictions"] == 0
+        and row["defect"] <= PUSHED
+        and row["momentum outside range(Jᵀ)"] <= MOMENTUM
+    ),
+    says=_map_says,
+    digits=3,
     note="IAPB against the Newton LCP; distances of v⁺ are in the kinetic metric, relative to |v⁻|. Must pull: no p >= "
-    "0 gives IAPB's velocity. Pulls by choice: some p >= 0 gives it, but IAPB's p, the one of least norm, pulls. Left "
-    "approaching: a contact approaches after the impact, with or without a row in (21). Defect: largest error of two "
-    "predictions, the distance and extra loss / KE⁻ = (1−e)/(1+e) distance². Impacts have no friction or device limit.",
-)  # fmt: skip
+    "0 gives IAPB's velocity. Pulls by choice: some p >= 0 gives it, but IAPB's p, the one of "
+    "least norm, pulls. Left "
+    "approaching: a contact approaches after the impact, with or without a row in (21). Defect: "
+    "largest error of two "
+    "predictions, the distance and extra loss / KE⁻ = (1−e)/(1+e) distance². Impacts have no "
+    "friction or device limit.",
+)
 
 
 COSINES = (-0.9, -0.6, -0.3, 0.0, 0.15, 0.35, 0.55, 0.75, 0.9)
@@ -208,18 +283,31 @@ SPEED_RATIOS = (0.05, 0.25, 0.45, 0.65, 0.85, 1.0)
 def _grid(study: Study) -> list[tuple[float, float, ImpactCase]]:
     """Return the two-contact impacts on a grid; points with r = c are left out."""
     rng, points = np.random.default_rng(2), product(COSINES, SPEED_RATIOS)
-    return [(cosine, ratio, two_contacts(cosine, ratio, rng)) for cosine, ratio in points if cosine != ratio]
+    return [
+        (cosine, ratio, two_contacts(cosine, ratio, rng))
+        for cosine, ratio in points
+        if cosine != ratio
+    ]
 
 
 def _two_contacts(study: Study, point: tuple[float, float, ImpactCase]) -> Row:
     cosine, ratio, case = point
     found = compare_case(case)
-    return {"cosine": cosine, "speed ratio": ratio, "agreement predicted": ratio >= cosine,
-            "agreement found": found["agrees"], "distance": found["distance"]}  # fmt: skip
+    return {
+        "cosine": cosine,
+        "speed ratio": ratio,
+        "agreement predicted": ratio >= cosine,
+        "agreement found": found["agrees"],
+        "distance": found["distance"],
+    }
 
 
 TWO_CONTACTS = Check(
-    key="two contacts", question="Two contacts have rows of length 1 and cosine c in the kinetic metric, and approach "
+    key="two contacts",
+    question="Two contacts have rows of length 1 and cosine c in the kinetic metric, and approach "
     "at speeds 1 and r <= 1. The laws agree if and only if r >= c.",
-    cases=_grid, row=_two_contacts, holds=lambda row: row["agreement predicted"] == row["agreement found"], digits=3,
-)  # fmt: skip
+    cases=_grid,
+    row=_two_contacts,
+    holds=lambda row: row["agreement predicted"] == row["agreement found"],
+    digits=3,
+)

@@ -1,11 +1,14 @@
-"""Compare the "ideal" world with the event-driven solution (the "truth") on every scene that has such a solution.
+"""Compare the "ideal" world with the event-driven solution (the "truth") on every scene that has
+such a solution.
 
-The errors should be proportional to the step. They are measured before impacts accumulate: positions in the sup norm,
-velocities in L¹ over time, because a small shift of an impact in time changes the velocity by the whole jump. Each of
-two levels has several step lengths, because the position of an impact within a step is arbitrary. The order of
-convergence follows from the largest errors of the two levels.
+The errors should be proportional to the step. They are measured before impacts accumulate:
+positions in the sup norm, velocities in L¹ over time, because a small shift of an impact in time
+changes the velocity by the whole jump. Each of two levels has several step lengths, because the
+position of an impact within a step is arbitrary. The order of convergence follows from the largest
+errors of the two levels.
 
-The folder `scenes` beside this module has small scenes in space that have such a solution; only this study uses them.
+The folder `scenes` beside this module has small scenes in space that have such a solution; only
+this study uses them.
 """
 
 from __future__ import annotations
@@ -25,20 +28,27 @@ from verification.check import Check
 from verification.finding import verdict_of_trials
 from verification.table import HOLDS
 
-TRUTH_SCENES = {path.stem: path for path in sorted((Path(__file__).parent / "scenes").glob("*.yaml"))}
-COARSE, FINE = (470.0, 500.0, 530.0), (1880.0, 2000.0, 2120.0)  # rates [Hz]; a factor of four between the levels
+TRUTH_SCENES = {
+    path.stem: path for path in sorted((Path(__file__).parent / "scenes").glob("*.yaml"))
+}
+COARSE, FINE = (
+    (470.0, 500.0, 530.0),
+    (1880.0, 2000.0, 2120.0),
+)  # rates [Hz]; a factor of four between the levels
 _LEVELS = 4.0
-# The convergence counts as first order if the errors per step on the fine level are at most this multiple of those on
-# the coarse level. The positions of impacts within steps change the errors by a factor below two on all scenes; errors
-# that do not shrink at all would give a factor of four.
+# The convergence counts as first order if the errors per step on the fine level are at most this
+# multiple of those on the coarse level. The positions of impacts within steps change the errors by
+# a factor below two on all scenes; errors that do not shrink at all would give a factor of four.
 BOUNDED = 2.5
-# The truth's own error may be at most this share of the errors on the fine level: it changes an order by at most 0.1.
+# The truth's own error may be at most this share of the errors on the fine level: it changes an
+# order by at most 0.1.
 WORTH = 0.1
 _ROUNDING = 1e-7  # per second of step: smaller errors are rounding and count as zero
 
 
 class TruthCase(NamedTuple):
-    """A scene, a duration before its impacts accumulate [s], and whether the run includes device and coupling."""
+    """A scene, a duration before its impacts accumulate [s], and whether the run includes device
+    and coupling."""
 
     scene: str
     duration: float
@@ -57,17 +67,46 @@ CASES = (
     TruthCase("peg_corner", 0.36, True, "three plastic impacts, with device and coupling"),
     TruthCase("peg_room", 0.36, True, "two plastic impacts, with device and coupling"),
     TruthCase("peg_hole", 0.36, True, "six contacts at once, with device and coupling"),
-    TruthCase("arm_pushing", 0.1, True, "one impact (e = 0.2) between moving bodies, before they accumulate"),
+    TruthCase(
+        "arm_pushing",
+        0.1,
+        True,
+        "one impact (e = 0.2) between moving bodies, before they accumulate",
+    ),
     TruthCase("three_link_arm_plastic", 0.45, False, "plastic impacts between moving bodies"),
     TruthCase("three_link_arm_elastic", 0.45, False, "elastic impacts between moving bodies"),
     TruthCase("held_arm", 0.3, False, "no contact: the hand pulls at a linkage"),
-    TruthCase("tumbling_body", 0.5, False, "in space, no contact: quaternions and Euler's equations alone"),
-    TruthCase("ball_dropped_in_space", 0.3, False, "in space: one impact (e = 0.6) of a spinning, eccentric ball"),
-    TruthCase("box_dropped_in_space", 0.2, False, "in space: impacts (e = 0.3) of two corners of a turning box"),
-    TruthCase("box_landing_in_space", 0.19, False, "in space: plastic impact of a corner, about which the box turns"),
-    TruthCase("cradle_in_space", 0.1, False, "in space: spheres of unequal mass, two impacts (e = 0.7)"),
-    TruthCase("arm_meets_a_wall_in_space", 0.3, False, "in space: an arm's plastic impact, contact that holds"),
-)  # fmt: skip
+    TruthCase(
+        "tumbling_body", 0.5, False, "in space, no contact: quaternions and Euler's equations alone"
+    ),
+    TruthCase(
+        "ball_dropped_in_space",
+        0.3,
+        False,
+        "in space: one impact (e = 0.6) of a spinning, eccentric ball",
+    ),
+    TruthCase(
+        "box_dropped_in_space",
+        0.2,
+        False,
+        "in space: impacts (e = 0.3) of two corners of a turning box",
+    ),
+    TruthCase(
+        "box_landing_in_space",
+        0.19,
+        False,
+        "in space: plastic impact of a corner, about which the box turns",
+    ),
+    TruthCase(
+        "cradle_in_space", 0.1, False, "in space: spheres of unequal mass, two impacts (e = 0.7)"
+    ),
+    TruthCase(
+        "arm_meets_a_wall_in_space",
+        0.3,
+        False,
+        "in space: an arm's plastic impact, contact that holds",
+    ),
+)
 WITHOUT_TRUTH = {
     "bar_on_posts": "its walls differ in restitution, of which exact events of Newton's law know one",
     "box_stack": "rests on overlaps that only penalties have",
@@ -81,41 +120,64 @@ WITHOUT_TRUTH = {
 def converge(case: TruthCase, law: Any = None) -> list[dict[str, Any]]:
     """Return the row of each level on one case; `law` replaces the contact law of the rigid world.
 
-    A row has the largest errors of three steps, positions in the sup norm over time and coordinates, velocities in the
-    L¹ norm over time, largest over the coordinates. The outcome, in the row of the fine level, is whether the errors
-    divided by the step stay bounded. An order is None if the errors are rounding alone.
+    A row has the largest errors of three steps, positions in the sup norm over time and
+    coordinates, velocities in the L¹ norm over time, largest over the coordinates. The outcome, in
+    the row of the fine level, is whether the errors divided by the step stay bounded. An order is
+    None if the errors are rounding alone.
     """
     scene = scene_of(case.scene)
     truth, law = scene_truth(scene, case.duration, case.coupled), law or RigidConstraints()
-    levels = [np.max([_errors(scene, case, truth, law, rate) for rate in level], axis=0) for level in (COARSE, FINE)]
+    levels = [
+        np.max([_errors(scene, case, truth, law, rate) for rate in level], axis=0)
+        for level in (COARSE, FINE)
+    ]
     _require_worth(case, truth, *levels[1])
     (position, velocity), rows = zip(*levels, strict=True), []
     for rates, errors in zip((COARSE, FINE), levels, strict=True):
         step = len(rates) / sum(rates)
-        rows.append({
-            "scene": case.scene, "events": len(truth.events), "step [ms]": 1e3 * step,
-            "error of positions": float(errors[0]) * step, "error of velocities": float(errors[1]) * step,
-            "order, positions": _order(*position), "order, velocities": _order(*velocity), HOLDS: None,
-        })  # fmt: skip
-    rows[1][HOLDS] = all(fine <= max(BOUNDED * coarse, _ROUNDING) for coarse, fine in (position, velocity))
+        rows.append(
+            {
+                "scene": case.scene,
+                "events": len(truth.events),
+                "step [ms]": 1e3 * step,
+                "error of positions": float(errors[0]) * step,
+                "error of velocities": float(errors[1]) * step,
+                "order, positions": _order(*position),
+                "order, velocities": _order(*velocity),
+                HOLDS: None,
+            }
+        )
+    rows[1][HOLDS] = all(
+        fine <= max(BOUNDED * coarse, _ROUNDING) for coarse, fine in (position, velocity)
+    )
     return rows
 
 
 def _order(coarse: float, fine: float) -> float | None:
-    """Return log₄ of the ratio of the largest errors, plus one because they are errors divided by the step."""
-    return float(1.0 + np.log(coarse / fine) / np.log(_LEVELS)) if min(coarse, fine) > _ROUNDING else None
+    """Return log₄ of the ratio of the largest errors, plus one because they are errors divided by
+    the step."""
+    return (
+        float(1.0 + np.log(coarse / fine) / np.log(_LEVELS))
+        if min(coarse, fine) > _ROUNDING
+        else None
+    )
 
 
 def _require_worth(case: TruthCase, truth: SceneTruth, position: float, velocity: float) -> None:
-    """Raise SolverError if the bounds of the truth's errors, in the same norms, are too large to compare with."""
+    """Raise SolverError if the bounds of the truth's errors, in the same norms, are too large to
+    compare with."""
     bound, last = truth.bound, min(1.0 / rate for rate in FINE)
     _, v = truth.state(np.linspace(0.0, truth.end, 101))
-    jumps = 2.0 * float(np.abs(v).max()) * bound.instant * len(truth.events)  # L¹ error of late or early jumps
+    jumps = (
+        2.0 * float(np.abs(v).max()) * bound.instant * len(truth.events)
+    )  # L¹ error of late or early jumps
     worth = bound.position, bound.velocity * case.duration + jumps
     for error, measured in zip(worth, (position, velocity), strict=True):
         if error > max(WORTH * measured, _ROUNDING) * last:
-            raise SolverError(f"{case.scene}: no reference: its error is {error:.1e}, "
-                              f"that of the steps {measured * last:.1e}")
+            raise SolverError(
+                f"{case.scene}: no reference: its error is {error:.1e}, "
+                f"that of the steps {measured * last:.1e}"
+            )
 
 
 def scene_of(name: str) -> Scene:
@@ -123,8 +185,11 @@ def scene_of(name: str) -> Scene:
     return load_scene(TRUTH_SCENES.get(name) or find_scene(name))
 
 
-def _errors(scene: Scene, case: TruthCase, truth: SceneTruth, law: Any, rate: float) -> tuple[float, float]:
-    """Return the errors of positions (sup norm) and velocities (L¹ norm), both divided by the step."""
+def _errors(
+    scene: Scene, case: TruthCase, truth: SceneTruth, law: Any, rate: float
+) -> tuple[float, float]:
+    """Return the errors of positions (sup norm) and velocities (L¹ norm), both divided by the
+    step."""
     steps = int(np.floor(case.duration * rate))
     stepped = scene.with_values({"rate": rate, "duration": case.duration})
     coupling = find_world("ideal").coupling_in(stepped) if case.coupled else None
@@ -133,16 +198,27 @@ def _errors(scene: Scene, case: TruthCase, truth: SceneTruth, law: Any, rate: fl
     return float(np.abs(run.q - q).max() * rate), float(np.abs(run.v - v).sum(axis=0).max())
 
 
-QUICK = ("two_discs", "bernoulli_balls", "two_link_arm_a", "peg_corner", "peg_hole", "arm_pushing",
-         "ball_dropped_in_space")  # the scenes of the quick depth
+QUICK = (
+    "two_discs",
+    "bernoulli_balls",
+    "two_link_arm_a",
+    "peg_corner",
+    "peg_hole",
+    "arm_pushing",
+    "ball_dropped_in_space",
+)  # the scenes of the quick depth
 
 
 CONVERGENCE = Check(
-    key="convergence", question="The ideal world converges to the event-driven solution at first order.",
+    key="convergence",
+    question="The ideal world converges to the event-driven solution at first order.",
     cases=lambda study: [case for case in CASES if study.depth == "full" or case.scene in QUICK],
-    row=lambda study, case: converge(case), spans=("order, positions", "order, velocities"), rule=verdict_of_trials,
+    row=lambda study, case: converge(case),
+    spans=("order, positions", "order, velocities"),
+    rule=verdict_of_trials,
     digits=3,
     note="Each row shows the largest error of three time steps near the given one; the row of the finer steps has the "
-    "verdict. Errors of positions are in the sup norm [m, rad], of velocities in L¹ over time [m, rad]. A dash: the "
+    "verdict. Errors of positions are in the sup norm [m, rad], of velocities in L¹ over time [m, "
+    "rad]. A dash: the "
     f"error is rounding alone. No event-driven solution exists for {', '.join(WITHOUT_TRUTH)}.",
-)  # fmt: skip
+)

@@ -1,7 +1,8 @@
 """Compare IAPB's extensions with complementarity: friction in the impact, and unequal restitution.
 
-Friction: the engine's law (`resolve_frictional_impact`) is compared with Coulomb's law (NCP) and its convex relaxation
-(CCP). Unequal restitution: the engine and the reference solve the two LCPs of Poisson's law with independent solvers.
+Friction: the engine's law (`resolve_frictional_impact`) is compared with Coulomb's law (NCP) and
+its convex relaxation (CCP). Unequal restitution: the engine and the reference solve the two LCPs of
+Poisson's law with independent solvers.
 """
 
 from __future__ import annotations
@@ -28,10 +29,12 @@ from verification.finding import verdict_of_trials
 from verification.impacts import Floats, ImpactCase
 from verification.table import Row
 
-# The sweeps of NSGS reach about 1e-10 of the velocities; outcomes of two different laws differ by far more.
+# The sweeps of NSGS reach about 1e-10 of the velocities; outcomes of two different laws differ by
+# far more.
 SAME_WITH_FRICTION = 1e-7
 GAIN = 1e-12  # a relative gain of kinetic energy below this is rounding
-# Largest difference of two solvers of one law: ten times the residual that `reference.complementarity.laws` accepts.
+# Largest difference of two solvers of one law: ten times the residual that
+# `reference.complementarity.laws` accepts.
 SAME_LAW = 1e-8
 RESTITUTIONS, FRICTIONS = (0.0, 0.5, 1.0), (0.1, 0.5, 1.0)
 COUNTS = {"quick": 40, "full": 300}  # impacts of each e and μ
@@ -39,7 +42,8 @@ UNEQUAL_COUNTS = {"quick": 100, "full": 1000}
 
 
 def draw(rng: np.random.Generator, approaching: bool) -> ImpactCase:
-    """Draw an impact with one to three contacts, one or two tangents each, and three to eight coordinates."""
+    """Draw an impact with one to three contacts, one or two tangents each, and three to eight
+    coordinates."""
     d, c, m = int(rng.integers(3, 9)), int(rng.integers(1, 4)), int(rng.integers(1, 3))
     velocity, rows = rng.normal(size=d), rng.normal(size=(c, d))
     if approaching:
@@ -65,7 +69,8 @@ def _distance(impact: ImpactCase, first: Floats, second: Floats) -> float:
 
 
 def with_friction(study: Study, case: tuple[float, float], seed: int = 44) -> Row:
-    """Compare the engine's frictional impact with Coulomb's NCP and CCP on random impacts with one e and one μ."""
+    """Compare the engine's frictional impact with Coulomb's NCP and CCP on random impacts with one
+    e and one μ."""
     (e, mu), rng = case, np.random.default_rng(seed)
     drawn = [draw(rng, approaching=True) for _ in range(COUNTS[study.depth])]
     impacts = [replace(one, restitution=e, friction=np.full(one.contacts, mu)) for one in drawn]
@@ -85,23 +90,35 @@ def with_friction(study: Study, case: tuple[float, float], seed: int = 44) -> Ro
             continue
         distances.append(_distance(impact, ours.velocity, ncp))
         without = resolve_impact(mass, rows, v, e).impulses
-        if ours.friction_share == 1.0 and min(ours.impulses.min(), without.min()) >= 0.0:  # all push, either way
+        if (
+            ours.friction_share == 1.0 and min(ours.impulses.min(), without.min()) >= 0.0
+        ):  # all push, either way
             pushing += 1
             same += distances[-1] <= SAME_WITH_FRICTION
     return {
-        "e": e, "μ": mu, "cases": len(impacts), "all contacts push": pushing, "share equal to the NCP": same,
-        "friction reduced": reduced, "unsolved": unsolved, "NCP gains": sum(g > GAIN for g in of_ncp),
-        "CCP gains": sum(g > GAIN for g in of_ccp), "largest change of KE, IAPB": max(of_ours),
-        "NCP": max(of_ncp, default=None), "CCP": max(of_ccp, default=None),
+        "e": e,
+        "μ": mu,
+        "cases": len(impacts),
+        "all contacts push": pushing,
+        "share equal to the NCP": same,
+        "friction reduced": reduced,
+        "unsolved": unsolved,
+        "NCP gains": sum(g > GAIN for g in of_ncp),
+        "CCP gains": sum(g > GAIN for g in of_ccp),
+        "largest change of KE, IAPB": max(of_ours),
+        "NCP": max(of_ncp, default=None),
+        "CCP": max(of_ccp, default=None),
         "median distance from the NCP": float(np.median(distances)) if distances else None,
-    }  # fmt: skip
+    }
 
 
 def _counterparts(impact: ImpactCase, e: float, mu: float) -> Iterator[Floats | None]:
     """Yield v⁺ of the NCP and of the CCP; None for a problem that NSGS does not solve."""
     mass, rows, v = impact.arrays
     blocks = np.concatenate([rows[:, None, :], impact.tangents], axis=1)
-    problem = ImpactProblem.from_impact(mass, blocks.reshape(-1, len(v)), v, e, mu, contact_size=blocks.shape[1])
+    problem = ImpactProblem.from_impact(
+        mass, blocks.reshape(-1, len(v)), v, e, mu, contact_size=blocks.shape[1]
+    )
     for law in (coulomb_ncp, coulomb_ccp):
         try:
             yield law(problem).velocity
@@ -110,39 +127,61 @@ def _counterparts(impact: ImpactCase, e: float, mu: float) -> Iterator[Floats | 
 
 
 FRICTION = Check(
-    key="friction", question="In impacts with dry friction, the law of the world IAPB-friction never adds energy. If "
-    "every contact pushes and no friction is reduced, it gives the velocity of Coulomb's law (a nonlinear "
-    "complementarity problem, NCP). With e > 0 the NCP and its convex relaxation (CCP) may add energy.",
-    cases=lambda study: product(RESTITUTIONS, FRICTIONS), row=with_friction, rule=verdict_of_trials, digits=2,
-    holds=lambda row: bool(row["share equal to the NCP"] == row["all contacts push"]
-                           and row["largest change of KE, IAPB"] <= GAIN),
+    key="friction",
+    question="In impacts with dry friction, the law of the world IAPB-friction never adds energy. If "
+    "every contact pushes and no friction is reduced, it gives the velocity of Coulomb's law (a "
+    "nonlinear "
+    "complementarity problem, NCP). With e > 0 the NCP and its convex relaxation (CCP) may add "
+    "energy.",
+    cases=lambda study: product(RESTITUTIONS, FRICTIONS),
+    row=with_friction,
+    rule=verdict_of_trials,
+    digits=2,
+    holds=lambda row: bool(
+        row["share equal to the NCP"] == row["all contacts push"]
+        and row["largest change of KE, IAPB"] <= GAIN
+    ),
     note="Columns 3 to 9 count impacts. Friction reduced: IAPB-friction scales it down so as to gain no energy. "
     "Changes of energy are relative to KE⁻; positive values are gains.",
-)  # fmt: skip
+)
 
 
 def with_unequal(study: Study, signs: str, seed: int = 45) -> Row:
-    """Compare the engine's law for unequal restitution with Poisson, the Newton LCP and plain equalities."""
+    """Compare the engine's law for unequal restitution with Poisson, the Newton LCP and plain
+    equalities."""
     rng, count = np.random.default_rng([seed, len(signs)]), UNEQUAL_COUNTS[study.depth]
     distances, gains = [], np.zeros((count, 3))
     for k in range(count):
         impact = draw(rng, approaching=signs == "all approach")
         e = rng.choice([0.0, 0.2, 0.7, 1.0], size=impact.contacts)
-        ours, problem = resolve_impact(*impact.arrays, e), ImpactProblem.from_impact(*impact.arrays, e)
+        ours, problem = (
+            resolve_impact(*impact.arrays, e),
+            ImpactProblem.from_impact(*impact.arrays, e),
+        )
         if len(set(e)) > 1:
             distances.append(_distance(impact, ours.velocity, poisson(problem).velocity))
-        gains[k] = [2.0 * ours.energy_change / _form(impact, impact.velocity),
-                    *(_gain(impact, law(problem).velocity) for law in (newton_lcp, newton_equality))]  # fmt: skip
+        gains[k] = [
+            2.0 * ours.energy_change / _form(impact, impact.velocity),
+            *(_gain(impact, law(problem).velocity) for law in (newton_lcp, newton_equality)),
+        ]
     names = ("largest change of KE, IAPB", "Newton LCP", "equalities")
-    return {"contacts": signs, "cases": count, "distance from Poisson's law": max(distances, default=None),
-            **dict(zip(names, gains.max(axis=0).tolist(), strict=True))}  # fmt: skip
+    return {
+        "contacts": signs,
+        "cases": count,
+        "distance from Poisson's law": max(distances, default=None),
+        **dict(zip(names, gains.max(axis=0).tolist(), strict=True)),
+    }
 
 
 UNEQUAL = Check(
-    key="unequal restitution", question="If e differs between contacts, the engine gives the velocity of Poisson's law "
+    key="unequal restitution",
+    question="If e differs between contacts, the engine gives the velocity of Poisson's law "
     "and never adds energy. Equalities v_n⁺ = −e v_n⁻ may add energy; so may the Newton LCP if some contacts separate.",
-    cases=lambda study: ("all approach", "mixed signs"), row=with_unequal, digits=2,
+    cases=lambda study: ("all approach", "mixed signs"),
+    row=with_unequal,
+    digits=2,
     note="The last three columns: largest (KE⁺ − KE⁻)/KE⁻ of each law. Mixed signs: some contacts separate before.",
-    holds=lambda row: bool(row["distance from Poisson's law"] <= SAME_LAW
-                           and row["largest change of KE, IAPB"] <= GAIN),
-)  # fmt: skip
+    holds=lambda row: bool(
+        row["distance from Poisson's law"] <= SAME_LAW and row["largest change of KE, IAPB"] <= GAIN
+    ),
+)

@@ -1,9 +1,10 @@
 """Random impacts on which the laws are compared, in families of known geometry.
 
-The rows of a case are the contacts that approach (gamma_minus < 0), as in the engine. Contacts that touch without
-approaching are stored separately, to see whether they approach after the impact. The geometry is set in the kinetic
-metric, because agreement depends on it there: with M = L Lᵀ, rows A = J L⁻ᵀ and u = Lᵀv, the impulse at one of two
-contacts can pull only if the cosine of their rows is positive.
+The rows of a case are the contacts that approach (gamma_minus < 0), as in the engine. Contacts that
+touch without approaching are stored separately, to see whether they approach after the impact. The
+geometry is set in the kinetic metric, because agreement depends on it there: with M = L Lᵀ, rows A
+= J L⁻ᵀ and u = Lᵀv, the impulse at one of two contacts can pull only if the cosine of their rows is
+positive.
 """
 
 from __future__ import annotations
@@ -15,13 +16,19 @@ import numpy as np
 from reference import Floats
 from verification.impacts import ImpactCase
 
-Draw = Callable[[np.random.Generator, int], tuple[Floats, Floats, Floats]]  # (rng, redundancy) -> (M, J, v)
+Draw = Callable[
+    [np.random.Generator, int], tuple[Floats, Floats, Floats]
+]  # (rng, redundancy) -> (M, J, v)
 
 
 def random_cases(
-    count: int, restitutions: Sequence[float] = (0.0, 0.5, 1.0), families: Sequence[str] = (), seed: int = 4
+    count: int,
+    restitutions: Sequence[float] = (0.0, 0.5, 1.0),
+    families: Sequence[str] = (),
+    seed: int = 4,
 ) -> Iterator[ImpactCase]:
-    """Yield `count` impacts for each family, restitution and redundancy; the same seed gives the same impacts."""
+    """Yield `count` impacts for each family, restitution and redundancy; the same seed gives the
+    same impacts."""
     for name in families or FAMILIES:
         draw, redundancies = FAMILIES[name]
         for redundancy in redundancies:
@@ -30,7 +37,9 @@ def random_cases(
             for e in restitutions:
                 for mass, rows, velocity in drawn:
                     closing = rows @ velocity < 0.0
-                    yield ImpactCase(mass, rows[closing], velocity, e, name, touching=rows[~closing])
+                    yield ImpactCase(
+                        mass, rows[closing], velocity, e, name, touching=rows[~closing]
+                    )
 
 
 def two_contacts(
@@ -38,8 +47,8 @@ def two_contacts(
 ) -> ImpactCase:
     """Return an impact at two contacts whose unit rows have this cosine in the kinetic metric.
 
-    The contacts approach at speeds 1 and `speed_ratio`. The lengths of the rows, the mass matrix and the velocity
-    components orthogonal to both rows are random.
+    The contacts approach at speeds 1 and `speed_ratio`. The lengths of the rows, the mass matrix
+    and the velocity components orthogonal to both rows are random.
     """
     frame = np.linalg.qr(rng.normal(size=(coordinates, coordinates)))[0]
     rows = np.array([[1.0, 0.0], [cosine, np.sqrt(1.0 - cosine**2)]]) @ frame[:2]
@@ -72,7 +81,8 @@ def _one_contact(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Flo
 
 
 def _cradle(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Floats, Floats]:
-    """Balls in a row whose velocities decrease from left to right, so that all neighbours approach each other."""
+    """Balls in a row whose velocities decrease from left to right, so that all neighbours approach
+    each other."""
     n = int(rng.integers(3, 9))
     rows = np.diff(np.eye(n), axis=0)
     return np.diag(np.exp(rng.normal(size=n))), rows, -np.cumsum(rng.uniform(0.1, 1.0, n))
@@ -123,7 +133,8 @@ def _hole(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Floats, Fl
 
 
 def _random_rows(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Floats, Floats]:
-    """Random rows and a random mass matrix; the redundant rows are sums of the others with positive weights."""
+    """Random rows and a random mass matrix; the redundant rows are sums of the others with positive
+    weights."""
     d = int(rng.integers(3, 13))
     independent, velocity = rng.normal(size=(int(rng.integers(2, d)), d)), rng.normal(size=d)
     independent = _approaching(independent, velocity)

@@ -1,7 +1,8 @@
 """Rebuild the impacts of recorded runs as cases, with the contact rows that collided.
 
-A run stores v before and after every impact, its Jᵀp, and the contacts of its step. The mechanism at the configuration
-of that step gives the rows (11)-(12). Every rebuilt case must reproduce the velocity that the run recorded.
+A run stores v before and after every impact, its Jᵀp, and the contacts of its step. The mechanism
+at the configuration of that step gives the rows (11)-(12). Every rebuilt case must reproduce the
+velocity that the run recorded.
 """
 
 from __future__ import annotations
@@ -21,18 +22,21 @@ from reference.contact_rows import unit_tangents
 from reference.worlds import run_world
 from verification.impacts import Floats, ImpactCase
 
-# Largest difference of the rebuilt and the recorded v⁺, relative to the largest |v⁻|: only rounding differs.
+# Largest difference of the rebuilt and the recorded v⁺, relative to the largest |v⁻|: only rounding
+# differs.
 _REBUILT = 1e-9
 
 
 def impacts_of_run(run: Run, scene: Scene) -> tuple[tuple[ImpactCase, ...], int]:
-    """Return the impacts of an IAPB run as cases, one for each step and contact group that collides, and the number of
-    impacts without a case: with per-body rows, unequal restitution or friction, or scaled by a device limit.
+    """Return the impacts of an IAPB run as cases, one for each step and contact group that
+    collides, and the number of impacts without a case: with per-body rows, unequal restitution or
+    friction, or scaled by a device limit.
 
     Raises
     ------
     IapbError
-        A rebuilt impact does not give the velocity that the run recorded, so the run is not a run of this scene.
+        A rebuilt impact does not give the velocity that the run recorded, so the run is not a run
+        of this scene.
     """
     mechanism, approach = mechanism_of(scene), scene.contact.approach_velocity
     values = restitutions_of(scene, pairs_of(scene, shapes_of(scene)))
@@ -46,22 +50,31 @@ def impacts_of_run(run: Run, scene: Scene) -> tuple[tuple[ImpactCase, ...], int]
         rows, v = _rows_of_step(run, mechanism, blow), blow.v_minus
         closing = rows @ v < -approach
         case = ImpactCase(
-            mechanism.mass_matrix(run.q[blow.step]), rows[closing], v, float(values[0]), f"scene {run.scene_name}",
+            mechanism.mass_matrix(run.q[blow.step]),
+            rows[closing],
+            v,
+            float(values[0]),
+            f"scene {run.scene_name}",
             touching=rows[~closing],
-        )  # fmt: skip
+        )
         off = np.abs(resolve_impact(*case.arrays, case.restitution).velocity - blow.v_plus).max()
         if off > _REBUILT * (float(np.abs(v).max()) or 1.0):
-            raise IapbError(f"the impact in step {blow.step} of {run.scene_name}, rebuilt from its run, has other "
-                            "velocities than recorded; simulate the run again")
+            raise IapbError(
+                f"the impact in step {blow.step} of {run.scene_name}, rebuilt from its run, has "
+                f"other "
+                "velocities than recorded; simulate the run again"
+            )
         cases.append(case)
     return tuple(cases), left_out
 
 
 def problems_of_run(run: Run, scene: Scene, most: int) -> tuple[tuple[ImpactProblem, ...], int]:
-    """Return impacts of an IAPB run as problems, and the number of impacts that `impacts_of_run` leaves out.
+    """Return impacts of an IAPB run as problems, and the number of impacts that `impacts_of_run`
+    leaves out.
 
-    It chooses at most `most` impacts: the one with the most contacts, and others spread over the motion. If the scene
-    has friction, each impact gives two problems, without and with friction. IAPB's own impacts have no friction.
+    It chooses at most `most` impacts: the one with the most contacts, and others spread over the
+    motion. If the scene has friction, each impact gives two problems, without and with friction.
+    IAPB's own impacts have no friction.
     """
     mechanism, mu = mechanism_of(scene), scene.contact.friction
     found, left_out = impacts_of_run(run, scene)
@@ -77,25 +90,40 @@ def problems_of_run(run: Run, scene: Scene, most: int) -> tuple[tuple[ImpactProb
         problems.append(ImpactProblem.from_impact(mass, normals, v, e, name=name))
         if mu > 0.0:
             rows = _with_tangents(run, scene, mechanism, taken[k])
-            problems.append(ImpactProblem.from_impact(mass, rows.reshape(-1, mechanism.nv), v, e, mu,
-                                                      contact_size=rows.shape[1], name=f"{name}, μ = {mu:g}"))
+            problems.append(
+                ImpactProblem.from_impact(
+                    mass,
+                    rows.reshape(-1, mechanism.nv),
+                    v,
+                    e,
+                    mu,
+                    contact_size=rows.shape[1],
+                    name=f"{name}, μ = {mu:g}",
+                )
+            )
     return tuple(problems), left_out
 
 
 def _with_tangents(run: Run, scene: Scene, mechanism: Mechanism, blow: _GroupImpact) -> Floats:
-    """Return rows (k, s, d) of the approaching contacts: the normal, then one tangent in 2D or two in 3D."""
+    """Return rows (k, s, d) of the approaching contacts: the normal, then one tangent in 2D or two
+    in 3D."""
     normals = run.contacts.normal[blow.contacts]
     tangents = unit_tangents(normals, getattr(scene, "dimensions", 2) == 3)
     directions = np.concatenate([normals[:, None], tangents], axis=1)
-    rows = np.stack([_rows_of_step(run, mechanism, blow, along) for along in directions.swapaxes(0, 1)], axis=1)
+    rows = np.stack(
+        [_rows_of_step(run, mechanism, blow, along) for along in directions.swapaxes(0, 1)], axis=1
+    )
     return rows[rows[:, 0] @ blow.v_minus < -scene.contact.approach_velocity]
 
 
 class _GroupImpact(NamedTuple):
-    """The impact of one contact group in one step; the engine resolves the group's islands one after another."""
+    """The impact of one contact group in one step; the engine resolves the group's islands one
+    after another."""
 
     step: int
-    contacts: list[int]  # indices of the group's contacts, also of those that touch without approaching
+    contacts: list[
+        int
+    ]  # indices of the group's contacts, also of those that touch without approaching
     v_minus: Floats
     v_plus: Floats  # (d,); outside the group's coordinates it equals v_minus
     scaled: bool
@@ -108,29 +136,40 @@ def _group_impacts(run: Run, mechanism: Mechanism) -> list[_GroupImpact]:
         of_step = np.flatnonzero(table.step == step)
         touching = range(int(run.contacts.offsets[step]), int(run.contacts.offsets[step + 1]))
         before, after = table.v_minus[of_step[0]], table.v_plus[of_step[-1]]
-        groups = {k: _trees_of_group(run, mechanism, touching, int(table.group[k])) for k in of_step}
+        groups = {
+            k: _trees_of_group(run, mechanism, touching, int(table.group[k])) for k in of_step
+        }
         for trees in dict.fromkeys(groups.values()):
             own = np.zeros(mechanism.nv, bool)
             for tree in trees:
                 own[slice(*mechanism.tree_dofs[tree])] = True
-            contacts = [m for m in touching if mechanism.tree_of_body[run.contacts.body_a[m]] in trees]
+            contacts = [
+                m for m in touching if mechanism.tree_of_body[run.contacts.body_a[m]] in trees
+            ]
             scaled = any(table.scale[k] != 1.0 for k in of_step if groups[k] == trees)
             found.append(_GroupImpact(step, contacts, before, np.where(own, after, before), scaled))
     return found
 
 
 def _trees_of_group(run: Run, mechanism: Mechanism, touching: range, group: int) -> frozenset[int]:
-    """Return the trees that contacts between moving bodies link to the tree `group` (paper, section III)."""
+    """Return the trees that contacts between moving bodies link to the tree `group` (paper, section
+    III)."""
     table, trees = run.contacts, {group}
-    links = [{int(mechanism.tree_of_body[table.body_a[m]]), int(mechanism.tree_of_body[table.body_b[m]])}
-             for m in touching if table.body_b[m] >= 0]  # fmt: skip
+    links = [
+        {int(mechanism.tree_of_body[table.body_a[m]]), int(mechanism.tree_of_body[table.body_b[m]])}
+        for m in touching
+        if table.body_b[m] >= 0
+    ]
     while any(link & trees and not link <= trees for link in links):
         trees |= set().union(*(link for link in links if link & trees))
     return frozenset(trees)
 
 
-def _rows_of_step(run: Run, mechanism: Mechanism, blow: _GroupImpact, directions: Floats | None = None) -> Floats:
-    """Return the rows nᵀ(J_a − J_b) (k, d) of the group's contacts, or the rows along other directions (k, 3)."""
+def _rows_of_step(
+    run: Run, mechanism: Mechanism, blow: _GroupImpact, directions: Floats | None = None
+) -> Floats:
+    """Return the rows nᵀ(J_a − J_b) (k, d) of the group's contacts, or the rows along other
+    directions (k, 3)."""
     table, q = run.contacts, run.q[blow.step]
     rows = np.zeros((len(blow.contacts), mechanism.nv))
     for i, m in enumerate(blow.contacts):

@@ -1,10 +1,12 @@
-"""Run every solver on every problem of a folder; recomputed residuals decide: solved, refused or failed.
+"""Run every solver on every problem of a folder; recomputed residuals decide: solved, refused or
+failed.
 
-The record also lists files that cannot be read, asymmetric matrices W and solvers that are not installed. Solutions
-are compared by velocities, because the impulses of hyperstatic problems are not unique.
+The record also lists files that cannot be read, asymmetric matrices W and solvers that are not
+installed. Solutions are compared by velocities, because the impulses of hyperstatic problems are
+not unique.
 
-`own_problems` makes problems for users without such a folder: the hard cases, impacts of the project's scenes,
-hyperstatic families, and patches with friction. They are the same in every call.
+`own_problems` makes problems for users without such a folder: the hard cases, impacts of the
+project's scenes, hyperstatic families, and patches with friction. They are the same in every call.
 """
 
 from __future__ import annotations
@@ -34,7 +36,9 @@ from verification.impacts import Floats
 from verification.table import Row
 
 VERDICTS = ("solved", "refused", "failed", "missing", "left out")
-FACTORS = np.concatenate([[1.0], np.geomspace(1.5, 1e5, 60)])  # multiples of the fastest solver's time
+FACTORS = np.concatenate(
+    [[1.0], np.geomspace(1.5, 1e5, 60)]
+)  # multiples of the fastest solver's time
 OWN = "own problems"  # name of the collection that `own_problems` makes
 Progress = Callable[[str, int, int], None]
 
@@ -42,10 +46,11 @@ Progress = Callable[[str, int, int], None]
 class ProblemStudy(NamedTuple):
     """A collection of problems, solved by every solver for its kind of problem.
 
-    lines : a row for each problem, with a column for each solver, and for each file that cannot be read
+    lines : a row for each problem, with a column for each solver, and for each file that cannot be
+        read
     rows : one for each solver and problem, as `run_solvers` returns them
-    profile : a row for each kind of problem, solver and factor: the share of the problems that the solver solves within
-        this factor of the fastest solver's time (Dolan and Moré)
+    profile : a row for each kind of problem, solver and factor: the share of the problems that the
+        solver solves within this factor of the fastest solver's time (Dolan and Moré)
     """
 
     lines: tuple[Row, ...]
@@ -59,50 +64,107 @@ class ProblemStudy(NamedTuple):
 
 
 def study_read(
-    name: str, problems: Sequence[StoredProblem], unread: Mapping[str, str] | None = None, longest: float = np.inf,
-    progress: Progress | None = None, failures: list[Failure] | None = None,
+    name: str,
+    problems: Sequence[StoredProblem],
+    unread: Mapping[str, str] | None = None,
+    longest: float = np.inf,
+    progress: Progress | None = None,
+    failures: list[Failure] | None = None,
 ) -> ProblemStudy:
-    """Solve every problem of a collection called `name`; `unread` has the reason for each file that cannot be read."""
-    pairs, say = sum(len(solver_names(stored.problem)) for stored in problems), progress or (lambda *_: None)
-    stage, begun, slow = f"problems of {name}, by every solver", itertools.count(), dict[str, float]()
+    """Solve every problem of a collection called `name`; `unread` has the reason for each file that
+    cannot be read."""
+    pairs, say = (
+        sum(len(solver_names(stored.problem)) for stored in problems),
+        progress or (lambda *_: None),
+    )
+    stage, begun, slow = (
+        f"problems of {name}, by every solver",
+        itertools.count(),
+        dict[str, float](),
+    )
     say(stage, 0, pairs)
     rows: list[SolverRow] = []
     with one_thread():
-        for friction in {stored.problem.friction is not None for stored in problems}:  # imports and compiles, untimed
+        for friction in {
+            stored.problem.friction is not None for stored in problems
+        }:  # imports and compiles, untimed
             size = 3 if friction else 1
-            run_solvers(ImpactProblem.from_delassus(np.eye(size), -np.eye(size)[0], 0.0, 0.5 if friction else None))
-        for problem in sorted((stored.problem for stored in problems), key=lambda problem: problem.size):
-            rows += attempt(problem.name, partial(
-                run_solvers, problem, longest=longest, slow=slow,
-                progress=lambda: say(stage, next(begun), pairs)), failures) or []
+            run_solvers(
+                ImpactProblem.from_delassus(
+                    np.eye(size), -np.eye(size)[0], 0.0, 0.5 if friction else None
+                )
+            )
+        for problem in sorted(
+            (stored.problem for stored in problems), key=lambda problem: problem.size
+        ):
+            rows += (
+                attempt(
+                    problem.name,
+                    partial(
+                        run_solvers,
+                        problem,
+                        longest=longest,
+                        slow=slow,
+                        progress=lambda: say(stage, next(begun), pairs),
+                    ),
+                    failures,
+                )
+                or []
+            )
     say(stage, pairs, pairs)
-    names, kinds, lines = dict.fromkeys(row.solver for row in rows), dict[str, list[SolverRow]](), list[Row]()
+    names, kinds, lines = (
+        dict.fromkeys(row.solver for row in rows),
+        dict[str, list[SolverRow]](),
+        list[Row](),
+    )
     for stored in problems:
         found = [row for row in rows if row.problem == stored.problem.name]
-        kinds.setdefault("frictionless" if stored.problem.friction is None else "friction", []).extend(found)
-        line = attempt(stored.problem.name, partial(_line, stored, found, names), failures) if found else None
+        kinds.setdefault(
+            "frictionless" if stored.problem.friction is None else "friction", []
+        ).extend(found)
+        line = (
+            attempt(stored.problem.name, partial(_line, stored, found, names), failures)
+            if found
+            else None
+        )
         lines += [line] if line else []
-    lines += [{"problem": file, **dict.fromkeys(names, "not read"), "why not read": reason}
-              for file, reason in (unread or {}).items()]  # fmt: skip
-    profile = [{"kind": kind, "solver": solver, "factor": float(factor), "share solved": float(share)}
-               for kind, found in kinds.items() for solver, shares in performance_profile(found, FACTORS).items()
-               for factor, share in zip(FACTORS, shares, strict=True)]  # fmt: skip
+    lines += [
+        {"problem": file, **dict.fromkeys(names, "not read"), "why not read": reason}
+        for file, reason in (unread or {}).items()
+    ]
+    profile = [
+        {"kind": kind, "solver": solver, "factor": float(factor), "share solved": float(share)}
+        for kind, found in kinds.items()
+        for solver, shares in performance_profile(found, FACTORS).items()
+        for factor, share in zip(FACTORS, shares, strict=True)
+    ]
     return ProblemStudy(tuple(lines), tuple(rows), tuple(profile))
 
 
 def _line(stored: StoredProblem, rows: list[SolverRow], solvers: Mapping[str, Any]) -> Row:
-    """Return the row of a problem: its size, the verdict on each solver, the spread of the contact velocities among
-    those that solved it, and the recomputed residual of the multipliers that the file has."""
+    """Return the row of a problem: its size, the verdict on each solver, the spread of the contact
+    velocities among those that solved it, and the recomputed residual of the multipliers that the
+    file has."""
     problem, verdicts, residual = stored.problem, {row.solver: row.verdict for row in rows}, None
     if stored.stored_impulse is not None and problem.size:
         residual = Solution(problem, stored.stored_impulse, "stored in the file").residuals.worst
-    rank = int(np.linalg.matrix_rank(problem.delassus, hermitian=problem.asymmetry == 0.0)) if problem.size else 0
+    rank = (
+        int(np.linalg.matrix_rank(problem.delassus, hermitian=problem.asymmetry == 0.0))
+        if problem.size
+        else 0
+    )
     return {
-        "problem": problem.name, "unknowns": problem.size, "rank": rank, "asymmetry of W": rows[0].asymmetry or None,
+        "problem": problem.name,
+        "unknowns": problem.size,
+        "rank": rank,
+        "asymmetry of W": rows[0].asymmetry or None,
         **{name: verdicts.get(name) for name in solvers},
-        "spread of velocities": max((row.spread for row in rows if row.verdict == "solved"), default=None),
-        "residual as stored": residual, "why not read": None,
-    }  # fmt: skip
+        "spread of velocities": max(
+            (row.spread for row in rows if row.verdict == "solved"), default=None
+        ),
+        "residual as stored": residual,
+        "why not read": None,
+    }
 
 
 def on_problems(study: Study, name: str, folder: Path | None) -> ProblemStudy:
@@ -122,42 +184,78 @@ def on_problems(study: Study, name: str, folder: Path | None) -> ProblemStudy:
 
 
 def collections(folders: Mapping[str, Path | None]) -> tuple[Check, ...]:
-    """Return a check for each folder by name (None: our own problems), and one with the profiles of all of them."""
+    """Return a check for each folder by name (None: our own problems), and one with the profiles of
+    all of them."""
     profile = Check(
-        key="profile", question="", cases=lambda study: folders, timed=["share solved"], digits=3,
+        key="profile",
+        question="",
+        cases=lambda study: folders,
+        timed=["share solved"],
+        digits=3,
         note="Share of the problems that a solver solves within this factor of the time of the fastest solver.",
-        row=lambda study, name: [{"collection": name, **row}
-                                 for row in on_problems(study, name, folders[name]).profile],
-    )  # fmt: skip
+        row=lambda study, name: [
+            {"collection": name, **row} for row in on_problems(study, name, folders[name]).profile
+        ],
+    )
     return (*(_collection(name, folder) for name, folder in folders.items()), profile)
 
 
 def _collection(name: str, folder: Path | None) -> Check:
     return Check(
-        key=name, question=f"{name[:1].upper()}{name[1:]}: at least one solver solves each problem.",
-        cases=lambda study: on_problems(study, name, folder).lines, row=lambda study, line: line,
-        holds=lambda row: "solved" in row.values(), rule=verdict_of_trials, timed=["spread of velocities"], digits=2,
+        key=name,
+        question=f"{name[:1].upper()}{name[1:]}: at least one solver solves each problem.",
+        cases=lambda study: on_problems(study, name, folder).lines,
+        row=lambda study, line: line,
+        holds=lambda row: "solved" in row.values(),
+        rule=verdict_of_trials,
+        timed=["spread of velocities"],
+        digits=2,
         note="Solved: every residual, recomputed from the problem, is at most 1e-6 of the velocity scale. Missing: the "
-        "solver is not installed. Left out: it took too long before. Spread: largest difference of the solutions' "
+        "solver is not installed. Left out: it took too long before. Spread: largest difference "
+        "of the solutions' "
         "contact velocities, relative to the velocity scale.",
-    )  # fmt: skip
+    )
 
 
 def _solver(study: Study, name: str) -> Row:
-    takes = {"lcp": "no friction", "convex": "no friction, W symmetric semidefinite", "cone": "friction"}
+    takes = {
+        "lcp": "no friction",
+        "convex": "no friction, W symmetric semidefinite",
+        "cone": "friction",
+    }
     entry = SOLVERS[name]
-    return {"solver": name, "method": entry.method, "package": entry.package, "takes": takes[entry.takes]}
+    return {
+        "solver": name,
+        "method": entry.method,
+        "package": entry.package,
+        "takes": takes[entry.takes],
+    }
 
 
 SOLVER_LIST = Check(
-    key="solvers", question="", cases=lambda study: SOLVERS, row=_solver, note="Times are of a call from Python.",
+    key="solvers",
+    question="",
+    cases=lambda study: SOLVERS,
+    row=_solver,
+    note="Times are of a call from Python.",
 )
 
 
-# Hard cases of the catalogue with few contacts. Cases with many contacts take the slowest solvers minutes.
-HARD = ("nearly_parallel_normals", "printed_formula_gains", "hilbert_rows", "kahan_rows", "mass_ratio",
-        "tiny_lever_arm", "face_at_three_points", "grazing", "subnormal_speeds", "light_direction",
-        "bar_with_unequal_restitution")
+# Hard cases of the catalogue with few contacts. Cases with many contacts take the slowest solvers
+# minutes.
+HARD = (
+    "nearly_parallel_normals",
+    "printed_formula_gains",
+    "hilbert_rows",
+    "kahan_rows",
+    "mass_ratio",
+    "tiny_lever_arm",
+    "face_at_three_points",
+    "grazing",
+    "subnormal_speeds",
+    "light_direction",
+    "bar_with_unequal_restitution",
+)
 HYPERSTATIC_CONTACTS = (8, 24, 64)
 SCENES = ("peg_corner", "peg_hole_space", "three_link_arm_elastic", "arm_obstacles")
 FAMILIES = ("face on floor", "corner", "tight hole", "random rows")
@@ -167,22 +265,33 @@ _SEED = 9
 
 
 def own_problems(failures: list[Failure] | None) -> tuple[StoredProblem, ...]:
-    """Return all problems of our own, frictionless ones first; `failures` receives those that cannot be made."""
-    makers: dict[str, Callable[[], tuple[Any, ...]]] = {f"hard case {name}": partial(_hard, name) for name in HARD}
+    """Return all problems of our own, frictionless ones first; `failures` receives those that
+    cannot be made."""
+    makers: dict[str, Callable[[], tuple[Any, ...]]] = {
+        f"hard case {name}": partial(_hard, name) for name in HARD
+    }
     makers |= {f"impact of {name}": partial(_widest, name) for name in SCENES}
     for case in random_cases(1, restitutions=(0.5,), families=FAMILIES, seed=_SEED):
         if case.redundancy:
-            makers[f"{case.family}, {case.redundancy} redundant of {case.contacts}"] = partial(_given, case)
+            makers[f"{case.family}, {case.redundancy} redundant of {case.contacts}"] = partial(
+                _given, case
+            )
     for contacts in HYPERSTATIC_CONTACTS:
         for make in (patch, pile):
             case = make(contacts, np.random.default_rng([_SEED, contacts]))
             makers[f"{make.__name__} of {contacts}"] = partial(_given, case)
-    makers |= {f"patch of {contacts}, μ = {mu:g}": partial(_rough_patch, contacts, mu)
-               for contacts in FRICTIONAL_CONTACTS for mu in FRICTIONS}
+    makers |= {
+        f"patch of {contacts}, μ = {mu:g}": partial(_rough_patch, contacts, mu)
+        for contacts in FRICTIONAL_CONTACTS
+        for mu in FRICTIONS
+    }
     makers |= {f"rod between walls, μ = {mu:g}": partial(_wedged_rod, mu) for mu in FRICTIONS}
     made = {name: attempt(name, given, failures) for name, given in makers.items()}
-    return tuple(StoredProblem(ImpactProblem.from_impact(*given, name=name))
-                 for name, given in made.items() if given is not None)  # fmt: skip
+    return tuple(
+        StoredProblem(ImpactProblem.from_impact(*given, name=name))
+        for name, given in made.items()
+        if given is not None
+    )
 
 
 def _given(case: Any) -> tuple[Any, ...]:
@@ -215,9 +324,13 @@ def _with_tangents(normals: np.ndarray) -> Floats:
 
 
 def _wedged_rod(mu: float) -> tuple[Any, ...]:
-    """Return a turning rod whose ends press on two facing walls: only friction can hold it, as the normals oppose."""
+    """Return a turning rod whose ends press on two facing walls: only friction can hold it, as the
+    normals oppose."""
     ends = (((-0.6, -0.8, 0.0), (1.0, 0.0)), ((0.6, 0.8, 0.0), (-1.0, 0.0)))
-    rows = [np.concatenate([direction, np.cross(point, direction)]) for point, (x, y) in ends
-            for direction in ((x, y, 0.0), (-y, x, 0.0), (0.0, 0.0, 1.0))]  # fmt: skip
+    rows = [
+        np.concatenate([direction, np.cross(point, direction)])
+        for point, (x, y) in ends
+        for direction in ((x, y, 0.0), (-y, x, 0.0), (0.0, 0.0, 1.0))
+    ]
     mass = np.diag([1.0, 1.0, 1.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0])
     return mass, np.array(rows), -np.array([0.0, -0.4, 0.1, 0.0, 0.0, 0.7]), 0.0, mu

@@ -1,1 +1,2 @@
-"""Computing time and accuracy of impacts, steps, whole motions and effects; timed calls run in turns."""
+"""Computing time and accuracy of impacts, steps, whole motions and effects; timed calls run in
+turns."""

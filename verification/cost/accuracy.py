@@ -1,7 +1,9 @@
-"""Error, energy gain and restitution residual of one impact against computing time, and the best method for a budget.
+"""Error, energy gain and restitution residual of one impact against computing time, and the best
+method for a budget.
 
-Every method resolves the same nine impacts of a size (`verification.impacts.timed_problems`), compiled or from Python.
-Methods that can be stopped early run with several amounts of work. `choose` finds the method for a budget of time.
+Every method resolves the same nine impacts of a size (`verification.impacts.timed_problems`),
+compiled or from Python. Methods that can be stopped early run with several amounts of work.
+`choose` finds the method for a budget of time.
 """
 
 from __future__ import annotations
@@ -37,7 +39,8 @@ CALLED, QP = "IAPB from Python", "DAQP from Python"
 
 @dataclass(frozen=True)
 class Way:
-    """A method with an amount of work; `make` returns the timed call; `rows` is a row budget, 0 for none."""
+    """A method with an amount of work; `make` returns the timed call; `rows` is a row budget, 0 for
+    none."""
 
     method: str
     work: str
@@ -49,11 +52,26 @@ class Way:
 ROWS, REPEATED = (1, 2, 4, 8, 16), (1, 4, 16, 64, 256, 1024)
 # To add a method, add a line here.
 WAYS: tuple[Way, ...] = (
-    *(Way(IAPB, f"{rows} row{'s' * (rows > 1)}", COMPILED, partial(calls.kernel_call, budget=rows), rows)
-      for rows in ROWS),
+    *(
+        Way(
+            IAPB,
+            f"{rows} row{'s' * (rows > 1)}",
+            COMPILED,
+            partial(calls.kernel_call, budget=rows),
+            rows,
+        )
+        for rows in ROWS
+    ),
     Way(IAPB, "all rows", COMPILED, calls.kernel_call),
-    *(Way(SWEEPS, f"{sweeps} sweep{'s' * (sweeps > 1)}", COMPILED, partial(calls.sweeps_call, sweeps=sweeps))
-      for sweeps in REPEATED),
+    *(
+        Way(
+            SWEEPS,
+            f"{sweeps} sweep{'s' * (sweeps > 1)}",
+            COMPILED,
+            partial(calls.sweeps_call, sweeps=sweeps),
+        )
+        for sweeps in REPEATED
+    ),
     Way(LEMKE, "all pivots", COMPILED, calls.lemke_call),
     Way(CALLED, "all rows", PYTHON, calls.engine_call),
     Way(PRINTED, "as printed", PYTHON, calls.printed_call),
@@ -61,7 +79,9 @@ WAYS: tuple[Way, ...] = (
 )
 SIZES = ((1, 3), (4, 3), (20, 6), (60, 12), (300, 30), (1000, 30))  # (contacts, coordinates)
 ROUNDS = 5
-LONGEST = 1e-2  # [s] largest time of a call: a slower method is timed once and skips all further impacts
+LONGEST = (
+    1e-2  # [s] largest time of a call: a slower method is timed once and skips all further impacts
+)
 _ENOUGH = 0.02  # [s] spent on one method of one impact; slow methods get fewer rounds
 LARGEST = 10_000  # contacts or coordinates of one impact: more would take hours or the whole memory
 NO_GAIN = 1e-12  # a relative gain of energy below this is rounding
@@ -81,25 +101,31 @@ def _hard(sizes: Iterable[tuple[int, int]]) -> list[Hard]:
 
 
 def work_precision(
-    sizes: Iterable[tuple[int, int]] = SIZES, rounds: int = ROUNDS, ways: Sequence[Way] = WAYS,
-    progress: Callable[[int, int], None] | None = None, failures: list[Failure] | None = None,
+    sizes: Iterable[tuple[int, int]] = SIZES,
+    rounds: int = ROUNDS,
+    ways: Sequence[Way] = WAYS,
+    progress: Callable[[int, int], None] | None = None,
+    failures: list[Failure] | None = None,
 ) -> Table:
     """Measure error, energy gain and time of every method on nine impacts of each size.
 
     Parameters
     ----------
     sizes : (contacts, coordinates) of each size
-    rounds : number of times that each method is timed, in random order, each time after a warm-up call
+    rounds : number of times that each method is timed, in random order, each time after a warm-up
+        call
     ways : methods, each with an amount of work
     progress : called as progress(impacts done, number of impacts)
-    failures : receives exceptions other than `IapbError`, which gives a row; if it is None, they propagate
+    failures : receives exceptions other than `IapbError`, which gives a row; if it is None, they
+        propagate
 
     Returns
     -------
     Table
-        One row per impact and way: the median time; |v⁺ − exact v⁺| / |v⁻| in the kinetic metric; the exact
-        (KE⁺ − KE⁻)/KE⁻, or 0 for a loss; max |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|). The outcome is "ok", "too slow" (more than
-        LONGEST), or "failed" with its reason; a failed row has only the time until the method gave up.
+        One row per impact and way: the median time; |v⁺ − exact v⁺| / |v⁻| in the kinetic metric;
+        the exact (KE⁺ − KE⁻)/KE⁻, or 0 for a loss; max |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|). The outcome is
+        "ok", "too slow" (more than LONGEST), or "failed" with its reason; a failed row has only the
+        time until the method gave up.
     """
     study, cases = Study(failures=failures), _hard(sizes)
     each = counted(cases, progress) if progress else cases
@@ -107,7 +133,8 @@ def work_precision(
 
 
 def _measured(ways: Sequence[Way], rounds: int, study: Study, case: Hard) -> Iterator[Row]:
-    """Yield the rows of one impact; a way that was too slow on an earlier impact is not tried again."""
+    """Yield the rows of one impact; a way that was too slow on an earlier impact is not tried
+    again."""
     problem = timed_problems(*case[:2])[case.number]
     slow: set[Way] = study.once("slow", set)
     made: dict[Way, Call] = {}
@@ -124,21 +151,44 @@ def _measured(ways: Sequence[Way], rounds: int, study: Study, case: Hard) -> Ite
         return (answer[0] if isinstance(answer[0], str) else answer[0].copy()), spent
 
     with one_thread():
-        found = {way: ("", LONGEST) if way in slow else attempt(
-            f"{problem.label}, {way.method}, {way.work}", partial(tried, way), study.failures) for way in ways}
-        good = [way for way, one in found.items() if one and not isinstance(one[0], str) and one[1] < LONGEST]
-        times = take_turns({way: sampler(made[way]) for way in good}, rounds, warm=False, enough=_ENOUGH)
+        found = {
+            way: ("", LONGEST)
+            if way in slow
+            else attempt(
+                f"{problem.label}, {way.method}, {way.work}", partial(tried, way), study.failures
+            )
+            for way in ways
+        }
+        good = [
+            way
+            for way, one in found.items()
+            if one and not isinstance(one[0], str) and one[1] < LONGEST
+        ]
+        times = take_turns(
+            {way: sampler(made[way]) for way in good}, rounds, warm=False, enough=_ENOUGH
+        )
     for way, answered in found.items():
         if answered is None:
             continue
         answer, spent = answered
-        row: dict[str, Any] = {"contacts": problem.contacts, "coordinates": problem.coordinates,
-                               "problem": problem.label, "method": way.method, "work": way.work, "called": way.called,
-                               **dict.fromkeys(MEASURED), "failed after [µs]": 1e6 * spent}  # fmt: skip
+        row: dict[str, Any] = {
+            "contacts": problem.contacts,
+            "coordinates": problem.coordinates,
+            "problem": problem.label,
+            "method": way.method,
+            "work": way.work,
+            "called": way.called,
+            **dict.fromkeys(MEASURED),
+            "failed after [µs]": 1e6 * spent,
+        }
         if way in times:
             taken = times[way]
-            row |= {"time [µs]": 1e6 * taken.median, "outcome": "ok", "failed after [µs]": None,
-                    "quartiles [µs]": f"{taken.lower * 1e6:.3g} to {taken.upper * 1e6:.3g}"}  # fmt: skip
+            row |= {
+                "time [µs]": 1e6 * taken.median,
+                "outcome": "ok",
+                "failed after [µs]": None,
+                "quartiles [µs]": f"{taken.lower * 1e6:.3g} to {taken.upper * 1e6:.3g}",
+            }
             row |= _quality(problem, answer)
         elif spent >= LONGEST:
             slow.add(way)
@@ -158,24 +208,40 @@ def _try(call: Call) -> Floats | str:
 
 
 def _quality(problem: ImpactCase, v_plus: Any) -> Row:
-    error = np.array([float(Fraction(x) - t) for x, t in zip(v_plus.tolist(), problem.truth, strict=True)])
+    error = np.array(
+        [float(Fraction(x) - t) for x, t in zip(v_plus.tolist(), problem.truth, strict=True)]
+    )
     found = {
         "relative error": float(np.linalg.norm(problem.lower.T @ error)) / problem.speed,
         # a loss with e < 1 is correct, so it is no error
-        "relative energy gain": max(relative_energy_gain(problem.mass_matrix, problem.velocity, v_plus), 0.0),
+        "relative energy gain": max(
+            relative_energy_gain(problem.mass_matrix, problem.velocity, v_plus), 0.0
+        ),
         "restitution residual": problem.unmet_restitution(v_plus),
     }
     return {name: value if math.isfinite(value) else None for name, value in found.items()}
 
 
-MEASURED = ("time [µs]", "quartiles [µs]", "relative error", "relative energy gain", "restitution residual",
-            "failed after [µs]", "outcome")  # fmt: skip
+MEASURED = (
+    "time [µs]",
+    "quartiles [µs]",
+    "relative error",
+    "relative energy gain",
+    "restitution residual",
+    "failed after [µs]",
+    "outcome",
+)
 ACCURACY = Check(
-    key="accuracy", question="How exact is an impact in the time that it takes?", cases=lambda _: _hard(SIZES),
-    row=partial(_measured, WAYS, ROUNDS), timed=MEASURED, timed_rows=True, digits=3,
+    key="accuracy",
+    question="How exact is an impact in the time that it takes?",
+    cases=lambda _: _hard(SIZES),
+    row=partial(_measured, WAYS, ROUNDS),
+    timed=MEASURED,
+    timed_rows=True,
+    digits=3,
     note="Times are medians of the thread's CPU time; methods run in random order, each after a warm-up call. "
     "Relative error: the distance of v⁺ from the exact v⁺ over |v⁻| (kinetic metric). Energy gain: 0 for a loss.",
-)  # fmt: skip
+)
 
 
 @dataclass(frozen=True)
@@ -184,10 +250,13 @@ class Choice:
 
     Attributes
     ----------
-    budget : time for one impact [s].  contacts, coordinates : the size.  method, work, called : the way to choose.
+    budget : time for one impact [s].  contacts, coordinates : the size.  method, work, called : the
+        way to choose.
     time : its median time [s].
-    error, largest : median and largest error of v⁺ over the impacts that end in time without a gain of energy.
-    share : share of these impacts.  solved : share of the impacts that also have an error of at most SOLVED.
+    error, largest : median and largest error of v⁺ over the impacts that end in time without a gain
+        of energy.
+    share : share of these impacts.  solved : share of the impacts that also have an error of at
+        most SOLVED.
     """
 
     budget: float
@@ -210,15 +279,27 @@ class Choice:
     @property
     def how(self) -> str:
         """The method in words, with the amount of work after which it stops."""
-        return f"{self.method}, stopped after {self.work}" if self.work.split()[0].isdigit() else self.method
+        return (
+            f"{self.method}, stopped after {self.work}"
+            if self.work.split()[0].isdigit()
+            else self.method
+        )
 
     def __str__(self) -> str:
         called = " (compiled)" if self.called == COMPILED else ""
-        use = "use" if self.enough else f"no method solves half of the hard cases to {SOLVED:g}; the nearest is"
-        return (f"With {short_time(self.budget)} for {self.contacts} contacts on {self.coordinates} coordinates, {use} "
-                f"{self.how}{called}: {short_time(self.time)} an impact, relative error of the "
-                f"velocity {self.error:.0e} (largest {self.largest:.0e}); {100 * self.share:.0f} % of the hard cases "
-                "end in time without a gain of energy.")
+        use = (
+            "use"
+            if self.enough
+            else f"no method solves half of the hard cases to {SOLVED:g}; the nearest is"
+        )
+        return (
+            f"With {short_time(self.budget)} for {self.contacts} contacts on {self.coordinates} "
+            f"coordinates, {use} "
+            f"{self.how}{called}: {short_time(self.time)} an impact, relative error of the "
+            f"velocity {self.error:.0e} (largest {self.largest:.0e}); {100 * self.share:.0f} % of "
+            f"the hard cases "
+            "end in time without a gain of energy."
+        )
 
 
 BUDGETS = (5e-7, 5e-6, 5e-5, 5e-4, 5e-3)  # [s]
@@ -227,25 +308,55 @@ _MOST = 0.99  # a larger share of solved impacts than this counts as no better
 SOLVED = 1e-3  # relative error below which an impact counts as solved
 
 
-def choose(measured: Table, budget: float, contacts: int, coordinates: int, called: str = COMPILED) -> Choice | None:
-    """Return the best way for a budget [s] at a measured size; None if no way answers in time without an energy gain.
+def choose(
+    measured: Table, budget: float, contacts: int, coordinates: int, called: str = COMPILED
+) -> Choice | None:
+    """Return the best way for a budget [s] at a measured size; None if no way answers in time
+    without an energy gain.
 
-    The best way solves the most of the nine impacts in time. Among equals it answers the most impacts in time; then it
-    has the least largest error, where errors below 1e-9 count as equal; then it is the fastest. Ways that solve less
-    than half of the impacts count as equal in the first criterion, and their `enough` is False.
+    The best way solves the most of the nine impacts in time. Among equals it answers the most
+    impacts in time; then it has the least largest error, where errors below 1e-9 count as equal;
+    then it is the fastest. Ways that solve less than half of the impacts count as equal in the
+    first criterion, and their `enough` is False.
     """
     found: list[Choice] = []
-    for rows in by_way(measured.where(contacts=contacts, coordinates=coordinates, called=called)).values():
-        good = [row for row in rows if row["outcome"] == "ok" and row["time"] <= 1e6 * budget
-                and row["relative energy gain"] <= NO_GAIN]
+    for rows in by_way(
+        measured.where(contacts=contacts, coordinates=coordinates, called=called)
+    ).values():
+        good = [
+            row
+            for row in rows
+            if row["outcome"] == "ok"
+            and row["time"] <= 1e6 * budget
+            and row["relative energy gain"] <= NO_GAIN
+        ]
         if good:
             errors = [row["relative error"] for row in good]
-            found.append(Choice(
-                budget, contacts, coordinates, good[0]["method"], good[0]["work"], called,
-                1e-6 * float(np.median([row["time"] for row in good])), float(np.median(errors)), max(errors),
-                len(good) / len(rows), sum(error <= SOLVED for error in errors) / len(rows)))
-    return min(found, key=lambda one: (-min(one.solved, _MOST) * one.enough, -min(one.share, _MOST),
-                                       max(one.largest, _EQUAL), one.time), default=None)
+            found.append(
+                Choice(
+                    budget,
+                    contacts,
+                    coordinates,
+                    good[0]["method"],
+                    good[0]["work"],
+                    called,
+                    1e-6 * float(np.median([row["time"] for row in good])),
+                    float(np.median(errors)),
+                    max(errors),
+                    len(good) / len(rows),
+                    sum(error <= SOLVED for error in errors) / len(rows),
+                )
+            )
+    return min(
+        found,
+        key=lambda one: (
+            -min(one.solved, _MOST) * one.enough,
+            -min(one.share, _MOST),
+            max(one.largest, _EQUAL),
+            one.time,
+        ),
+        default=None,
+    )
 
 
 def by_way(measured: Table) -> dict[tuple[str, str], list[dict[str, Any]]]:
@@ -256,8 +367,11 @@ def by_way(measured: Table) -> dict[tuple[str, str], list[dict[str, Any]]]:
     return ways
 
 
-def which_method(budget: float, contacts: int, coordinates: int, rounds: int = ROUNDS) -> tuple[Choice, ...]:
-    """Measure one size of impact on this machine and return the best method, compiled and from Python.
+def which_method(
+    budget: float, contacts: int, coordinates: int, rounds: int = ROUNDS
+) -> tuple[Choice, ...]:
+    """Measure one size of impact on this machine and return the best method, compiled and from
+    Python.
 
     Parameters
     ----------
@@ -268,7 +382,8 @@ def which_method(budget: float, contacts: int, coordinates: int, rounds: int = R
     Returns
     -------
     tuple of Choice
-        The best compiled method and the best method called from Python; without those that have no way in time.
+        The best compiled method and the best method called from Python; without those that have no
+        way in time.
 
     Raises
     ------
@@ -278,10 +393,16 @@ def which_method(budget: float, contacts: int, coordinates: int, rounds: int = R
     if isinstance(budget, bool) or not isinstance(budget, Real) or not 0.0 < budget < math.inf:
         raise ArgumentError("budget", budget, "a finite number of seconds above 0")
     for name, value in (("contacts", contacts), ("coordinates", coordinates), ("rounds", rounds)):
-        if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 1 <= value <= LARGEST:
+        if (
+            isinstance(value, bool)
+            or not isinstance(value, int | np.integer)
+            or not 1 <= value <= LARGEST
+        ):
             raise ArgumentError(name, value, f"a whole number from 1 to {LARGEST:,}")
     measured = work_precision([(contacts, coordinates)], rounds)
-    found = (choose(measured, budget, contacts, coordinates, called) for called in (COMPILED, PYTHON))
+    found = (
+        choose(measured, budget, contacts, coordinates, called) for called in (COMPILED, PYTHON)
+    )
     return tuple(choice for choice in found if choice is not None)
 
 
@@ -290,47 +411,103 @@ def short_time(seconds_: float) -> str:
     return f"{1e3 * seconds_:.2g} ms" if seconds_ >= 1e-3 else f"{1e6 * seconds_:.3g} µs"
 
 
-CHOSEN = ("contacts", "coordinates", "budget [µs]", "method", "work", "time [µs]", "error", "largest error",
-          "share solved [%]", "nearest", "from Python")  # fmt: skip
+CHOSEN = (
+    "contacts",
+    "coordinates",
+    "budget [µs]",
+    "method",
+    "work",
+    "time [µs]",
+    "error",
+    "largest error",
+    "share solved [%]",
+    "nearest",
+    "from Python",
+)
 
 
 def choices(measured: Table) -> Table:
     """Return the result of `choose` for every measured size and every budget."""
     rows, sizes = [], dict.fromkeys(measured.select(("contacts", "coordinates")).rows)
     for (contacts, coordinates), budget in product(sizes, BUDGETS):
-        best, python = (choose(measured, budget, contacts, coordinates, called) for called in (COMPILED, PYTHON))
+        best, python = (
+            choose(measured, budget, contacts, coordinates, called) for called in (COMPILED, PYTHON)
+        )
         row = dict.fromkeys(CHOSEN) | {
-            "contacts": contacts, "coordinates": coordinates, "budget [µs]": 1e6 * budget, "method": "none",
-            "from Python": f"{python.method}, {short_time(python.time)}" if python and python.enough else "none"}
+            "contacts": contacts,
+            "coordinates": coordinates,
+            "budget [µs]": 1e6 * budget,
+            "method": "none",
+            "from Python": f"{python.method}, {short_time(python.time)}"
+            if python and python.enough
+            else "none",
+        }
         if best and best.enough:
-            row |= {"method": best.method, "work": best.work, "time [µs]": 1e6 * best.time, "error": best.error,
-                    "largest error": best.largest, "share solved [%]": 100.0 * best.solved}  # fmt: skip
+            row |= {
+                "method": best.method,
+                "work": best.work,
+                "time [µs]": 1e6 * best.time,
+                "error": best.error,
+                "largest error": best.largest,
+                "share solved [%]": 100.0 * best.solved,
+            }
         elif best:
             row["nearest"] = f"{best.method}, {best.work}: {best.largest:.1g}"
         rows.append(row)
-    return table_from(rows, digits=2, timed=CHOSEN[3:], note=(
-        f"The compiled method, and the method called from Python, that solve most of the nine impacts to {SOLVED:g} in "
-        "time; ties as in the picture. Time and error are medians. None: no method solves half of the "
-        "impacts; “nearest” is then the method that answers most impacts in time, with its largest error."))
+    return table_from(
+        rows,
+        digits=2,
+        timed=CHOSEN[3:],
+        note=(
+            f"The compiled method, and the method called from Python, that solve most of the nine "
+            f"impacts to {SOLVED:g} in "
+            "time; ties as in the picture. Time and error are medians. None: no method solves "
+            "half of the "
+            "impacts; “nearest” is then the method that answers most impacts in time, with its "
+            "largest error."
+        ),
+    )
 
 
 def lost_to_rivals(measured: Table, called: str = COMPILED) -> Table:
-    """Return the impacts on which a complementarity solver is faster than IAPB at the same error or 1e-6.
+    """Return the impacts on which a complementarity solver is faster than IAPB at the same error or
+    1e-6.
 
-    Both are compiled, or both are called from Python; there IAPB checks its arguments, and DAQP does not.
+    Both are compiled, or both are called from Python; there IAPB checks its arguments, and DAQP
+    does not.
     """
     rows = measured.where(called=called, outcome="ok").records()
-    ours = {(row["contacts"], row["problem"]): row for row in rows
-            if row["method"] == (IAPB if called == COMPILED else CALLED) and row["work"] == "all rows"}
+    ours = {
+        (row["contacts"], row["problem"]): row
+        for row in rows
+        if row["method"] == (IAPB if called == COMPILED else CALLED) and row["work"] == "all rows"
+    }
     lost = []
     for row in rows:
         mine = ours[row["contacts"], row["problem"]]
-        good = row["relative error"] <= max(1e-6, mine["relative error"]) and row["relative energy gain"] <= NO_GAIN
+        good = (
+            row["relative error"] <= max(1e-6, mine["relative error"])
+            and row["relative energy gain"] <= NO_GAIN
+        )
         if good and row["time"] < mine["time"] and row["method"] not in (IAPB, CALLED, PRINTED):
-            lost.append((row["contacts"], row["problem"], row["method"], row["work"], row["time"], mine["time"],
-                         mine["time"] / row["time"]))
-    return titled(("contacts", "problem", "solver", "work", "time [µs]", "IAPB [µs]", "ratio"), lost, digits=3,
-                  timed=("time [µs]", "IAPB [µs]", "ratio"), timed_rows=True)
+            lost.append(
+                (
+                    row["contacts"],
+                    row["problem"],
+                    row["method"],
+                    row["work"],
+                    row["time"],
+                    mine["time"],
+                    mine["time"] / row["time"],
+                )
+            )
+    return titled(
+        ("contacts", "problem", "solver", "work", "time [µs]", "IAPB [µs]", "ratio"),
+        lost,
+        digits=3,
+        timed=("time [µs]", "IAPB [µs]", "ratio"),
+        timed_rows=True,
+    )
 
 
 TRUNCATED = ((6, 24), (12, 60), (30, 120))  # (d, c), rows of rank two thirds of d
@@ -345,10 +522,13 @@ class Stopped(NamedTuple):
 
 
 def stopped(study: Study, case: Stopped) -> Row:
-    """Resolve random plastic impacts with a row budget and return the worst and the typical of them."""
+    """Resolve random plastic impacts with a row budget and return the worst and the typical of
+    them."""
     d, c, budget = case
-    impacts = [random_impact(d, c, np.random.default_rng([0, d, c, k]), 0.0)
-               for k in range(40 if study.depth == "full" else 15)]
+    impacts = [
+        random_impact(d, c, np.random.default_rng([0, d, c, k]), 0.0)
+        for k in range(40 if study.depth == "full" else 15)
+    ]
     residuals, gains, lost = [], [], []
     for one in impacts:
         mass, rows, v = one.arrays
@@ -358,9 +538,16 @@ def stopped(study: Study, case: Stopped) -> Row:
         gains.append(relative_energy_gain(mass, v, v_plus))
         before, after, least = (0.5 * float(w @ mass @ w) for w in (v, v_plus, full))
         lost.append((before - after) / (before - least))
-    return {"coordinates": d, "contacts": c, "rank": impacts[0].rank, "budget [rows]": budget,
-            "median residual": float(np.median(residuals)), "largest residual": max(residuals),
-            "share of the loss": float(np.median(lost)), "largest relative gain": max(gains)}  # fmt: skip
+    return {
+        "coordinates": d,
+        "contacts": c,
+        "rank": impacts[0].rank,
+        "budget [rows]": budget,
+        "median residual": float(np.median(residuals)),
+        "largest residual": max(residuals),
+        "share of the loss": float(np.median(lost)),
+        "largest relative gain": max(gains),
+    }
 
 
 def _budgets_say(table: Table) -> Part:
@@ -369,14 +556,22 @@ def _budgets_say(table: Table) -> Part:
     half = [100 * row["share of the loss"] for row in rows if row["budget"] == row["rank"] // 2]
     return target(
         "An impact that stops early, after a budget of rows (energy computed exactly)",
-        f"adds energy in {gains} of {len(rows)} combinations of size and budget. With half of the rows it takes "
-        f"{min(half):.0f} to {max(half):.0f} % of the energy that all rows take", "never adds energy",
-        gains == 0, timed=False)  # fmt: skip
+        f"adds energy in {gains} of {len(rows)} combinations of size and budget. With half of the "
+        f"rows it takes "
+        f"{min(half):.0f} to {max(half):.0f} % of the energy that all rows take",
+        "never adds energy",
+        gains == 0,
+        timed=False,
+    )
 
 
 BUDGET_ROWS = Check(
-    key="budgets", question="What does an impact give that stops early?", row=stopped, says=_budgets_say, digits=3,
+    key="budgets",
+    question="What does an impact give that stops early?",
+    row=stopped,
+    says=_budgets_say,
+    digits=3,
     cases=lambda _: [Stopped(d, c, k) for d, c in TRUNCATED for k in range((2 * d) // 3 + 1)],
     note="Residual: max |Jᵢ v⁺ + e Jᵢ v⁻| / √(Jᵢ M⁻¹ Jᵢᵀ) over the contacts i, relative to |v⁻| in the kinetic "
     "metric. Share of the loss: the energy lost, relative to the complete impact (median). A negative gain is a loss.",
-)  # fmt: skip
+)

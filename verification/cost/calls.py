@@ -1,4 +1,5 @@
-"""The timed calls that resolve one impact from M, J, v to v⁺; kernels are repeated in compiled code."""
+"""The timed calls that resolve one impact from M, J, v to v⁺; kernels are repeated in compiled
+code."""
 
 from __future__ import annotations
 
@@ -36,16 +37,20 @@ def printed_call(case: ImpactCase) -> Call:
 
 
 def solver_call(case: ImpactCase, name: str) -> Call:
-    """Return a call that poses the impact as a complementarity problem in p ≥ 0 and solves it with a solver by name.
+    """Return a call that poses the impact as a complementarity problem in p ≥ 0 and solves it with
+    a solver by name.
 
     It includes the checks of the arguments and W. If the solver returns no impulse, v⁺ is NaN.
     """
-    return lambda: solve(ImpactProblem.from_impact(*case.arrays, case.restitution), name).velocity_plus
+    return lambda: (
+        solve(ImpactProblem.from_impact(*case.arrays, case.restitution), name).velocity_plus
+    )
 
 
 @dataclass(frozen=True)
 class KernelCall:
-    """A kernel on arrays that are allocated once; its last arguments are v⁺ (d,) and how often it resolves."""
+    """A kernel on arrays that are allocated once; its last arguments are v⁺ (d,) and how often it
+    resolves."""
 
     kernel: Callable[..., Any]
     given: tuple[Any, ...]
@@ -62,21 +67,39 @@ class KernelCall:
 
 
 def kernel_call(case: ImpactCase, budget: int | None = None) -> KernelCall:
-    """Return a call of the engine's kernel with at most `budget` rows; it factors M and copies the rows."""
+    """Return a call of the engine's kernel with at most `budget` rows; it factors M and copies the
+    rows."""
     mass, rows, v = map(np.ascontiguousarray, case.arrays)
     c, d = rows.shape
     work = block(zeros_of(ImpactWork, velocity=d, row=c))
     work.mass[:], work.v[:] = mass, v
-    return KernelCall(repeat_impact, (case.restitution, np.ascontiguousarray(rows.T), d if budget is None else budget,
-                                      work), np.zeros(d))  # fmt: skip
+    return KernelCall(
+        repeat_impact,
+        (case.restitution, np.ascontiguousarray(rows.T), d if budget is None else budget, work),
+        np.zeros(d),
+    )
 
 
 def sweeps_call(case: ImpactCase, sweeps: int) -> KernelCall:
     """Return a call of projected Gauss-Seidel."""
     mass, rows, v = map(np.ascontiguousarray, case.arrays)
     c, d = rows.shape
-    return KernelCall(repeat_sweeps, (mass, np.zeros((d, d)), v, case.restitution, rows, sweeps, np.zeros((c, d)),
-                                      np.zeros(c), np.zeros(c), np.zeros(c)), np.zeros(d))  # fmt: skip
+    return KernelCall(
+        repeat_sweeps,
+        (
+            mass,
+            np.zeros((d, d)),
+            v,
+            case.restitution,
+            rows,
+            sweeps,
+            np.zeros((c, d)),
+            np.zeros(c),
+            np.zeros(c),
+            np.zeros(c),
+        ),
+        np.zeros(d),
+    )
 
 
 def lemke_call(case: ImpactCase) -> KernelCall:
@@ -84,17 +107,22 @@ def lemke_call(case: ImpactCase) -> KernelCall:
     try:
         import_lcp_lemke()
     except ImportError as error:
-        raise MissingDependencyError("quantecon", "Lemke kernel", installing("reference")) from error
+        raise MissingDependencyError(
+            "quantecon", "Lemke kernel", installing("reference")
+        ) from error
     from verification.cost.lemke_kernel import repeat_lemke  # brings quantecon
 
     return KernelCall(repeat_lemke, (*case.arrays, case.restitution), np.zeros(case.coordinates))
 
 
-DAQP_TOLERANCE = 1e-11  # 1e-13 makes daqp cycle on 9 of the 54 hard impacts, 1e-12 on 2; this one solves all
+DAQP_TOLERANCE = (
+    1e-11  # 1e-13 makes daqp cycle on 9 of the 54 hard impacts, 1e-12 on 2; this one solves all
+)
 
 
 def daqp_call(case: ImpactCase) -> Call:
-    """Return a call of DAQP without checks: compiled code poses the problem, Python calls only the solver.
+    """Return a call of DAQP without checks: compiled code poses the problem, Python calls only the
+    solver.
 
     `solver_call` also checks the arguments and forms W, and takes several times as long.
     """
@@ -120,7 +148,8 @@ def daqp_call(case: ImpactCase) -> Call:
 
 @kernel
 def repeat_impact(restitution, columns, budget, work, v_plus, times):  # type: ignore[no-untyped-def]
-    """Repeat `times` times: factor M, copy the rows and resolve the impact with at most `budget` rows."""
+    """Repeat `times` times: factor M, copy the rows and resolve the impact with at most `budget`
+    rows."""
     d, count = columns.shape
     for _ in range(times):
         cholesky(work.mass, work.lower)
@@ -143,12 +172,25 @@ def whiten_rows(lower, rows, whitened, square):  # type: ignore[no-untyped-def]
 
 @kernel
 def repeat_sweeps(  # type: ignore[no-untyped-def]
-    mass_matrix, lower, v, restitution, rows, sweeps, whitened, share, impulses, wanted, v_plus, times
+    mass_matrix,
+    lower,
+    v,
+    restitution,
+    rows,
+    sweeps,
+    whitened,
+    share,
+    impulses,
+    wanted,
+    v_plus,
+    times,
 ):
-    """Solve Newton's LCP `times` times by sweeps of projected Gauss-Seidel over the contacts, as physics engines do.
+    """Solve Newton's LCP `times` times by sweeps of projected Gauss-Seidel over the contacts, as
+    physics engines do.
 
-    It forms no Delassus matrix: each contact reads u and corrects it. `whitened` is A (c, d); `share` holds the squared
-    lengths of its rows, `wanted` the velocity that each contact should have afterwards.
+    It forms no Delassus matrix: each contact reads u and corrects it. `whitened` is A (c, d);
+    `share` holds the squared lengths of its rows, `wanted` the velocity that each contact should
+    have afterwards.
     """
     for _ in range(times):
         cholesky(mass_matrix, lower)
@@ -160,7 +202,9 @@ def repeat_sweeps(  # type: ignore[no-untyped-def]
         for _sweep in range(sweeps):
             for i in range(rows.shape[0]):
                 if share[i] > 0.0:
-                    impulse = max(0.0, impulses[i] - (dot_of(whitened[i], v_plus) - wanted[i]) / share[i])
+                    impulse = max(
+                        0.0, impulses[i] - (dot_of(whitened[i], v_plus) - wanted[i]) / share[i]
+                    )
                     add_multiple(v_plus, impulse - impulses[i], whitened[i])
                     impulses[i] = impulse
         from_whitened(lower, v_plus, v_plus)
@@ -168,7 +212,8 @@ def repeat_sweeps(  # type: ignore[no-untyped-def]
 
 @kernel
 def pose_velocity_form(mass_matrix, lower, rows, v, restitution, unit, least):  # type: ignore[no-untyped-def]
-    """Write unit rows of A (c, d) and bounds b (c,) of  min ½|x|², A x ≥ b  with |b| ≤ 1; return the scale of b.
+    """Write unit rows of A (c, d) and bounds b (c,) of  min ½|x|², A x ≥ b  with |b| ≤ 1; return
+    the scale of b.
 
     x is the change of u = Lᵀ v, divided by the scale.
     """

@@ -1,11 +1,12 @@
-"""The effects that a scene needs, the time of a step, the share of each effect in it, and the motion without it.
+"""The effects that a scene needs, the time of a step, the share of each effect in it, and the
+motion without it.
 
 Only this module measures the time of a scene's step in seconds; other modules give ratios of times.
 
-The variants run in turns: the scene with its effects, the scene with every switch on, and the scene without one of its
-effects. `LEFT_OUT` defines how an effect is left out: by other values of the scene, another law or coupling, a switch
-of the compiled step, or fewer pairs of shapes that may touch. Times are compared in each round, positions over the
-whole run.
+The variants run in turns: the scene with its effects, the scene with every switch on, and the scene
+without one of its effects. `LEFT_OUT` defines how an effect is left out: by other values of the
+scene, another law or coupling, a switch of the compiled step, or fewer pairs of shapes that may
+touch. Times are compared in each round, positions over the whole run.
 """
 
 from __future__ import annotations
@@ -38,50 +39,75 @@ SAMPLES = 400  # number of instants at which positions are compared
 
 
 LEFT_OUT: dict[str, dict[str, Any]] = {  # effect -> the variant of the scene without it, see `Loop`
-    **{name: {"switches": (name,)} for name in
-       ("varying_inertia", "velocity_terms", "joint_damping", "joint_limits", "unequal_restitution")},
-    "hand_force": {"values": {"hand.force": None, "hand.force_table": (), "hand.force_function": ()}},
+    **{
+        name: {"switches": (name,)}
+        for name in (
+            "varying_inertia",
+            "velocity_terms",
+            "joint_damping",
+            "joint_limits",
+            "unequal_restitution",
+        )
+    },
+    "hand_force": {
+        "values": {"hand.force": None, "hand.force_table": (), "hand.force_function": ()}
+    },
     "wall_contacts": {"untouched": "wall"},
     "body_contacts": {"untouched": "body"},
     "impulses": {"impulses": False},
     "coupling": {"coupled": False},
-    **{name: {"values": {path: value}} for name, path, value in (
-        ("gravity", "gravity", None),
-        ("self_collisions", "contact.self_collisions", False),
-        ("penalty_stiffness", "contact.stiffness", 0.0),
-        ("contact_damping", "contact.damping", 0.0),
-        ("friction", "contact.friction", 0.0),
-        ("clustering", "contact.cluster_distance", 0.0),
-        ("coherence", "contact.coherence_distance", 0.0),
-        ("delay", "device.delay", 0),
-        ("quantisation", "device.position_resolution", None),
-        ("device_damping", "device.damping", None),
-        ("device_limits", "device.force_limit", None),
-    )},
-}  # fmt: skip
-# Effects that a switch of the step can turn on in a scene that does not need them; they then change nothing. Friction
-# in impacts is not among them, because its law needs arrays of its own.
-SWITCHED = tuple(name for name in engine.Switches._fields if name in EFFECT_NAMES and name != "impact_friction")
+    **{
+        name: {"values": {path: value}}
+        for name, path, value in (
+            ("gravity", "gravity", None),
+            ("self_collisions", "contact.self_collisions", False),
+            ("penalty_stiffness", "contact.stiffness", 0.0),
+            ("contact_damping", "contact.damping", 0.0),
+            ("friction", "contact.friction", 0.0),
+            ("clustering", "contact.cluster_distance", 0.0),
+            ("coherence", "contact.coherence_distance", 0.0),
+            ("delay", "device.delay", 0),
+            ("quantisation", "device.position_resolution", None),
+            ("device_damping", "device.damping", None),
+            ("device_limits", "device.force_limit", None),
+        )
+    },
+}
+# Effects that a switch of the step can turn on in a scene that does not need them; they then change
+# nothing. Friction in impacts is not among them, because its law needs arrays of its own.
+SWITCHED = tuple(
+    name for name in engine.Switches._fields if name in EFFECT_NAMES and name != "impact_friction"
+)
 _WHOLE, _ALL_ON = "with its effects", "all switched on"
 SCENES = ("peg_corner", "arm_pushing", "arm_obstacles")  # scenes whose effects are shown one by one
 _BELOW = "below the noise"
 NOTHING = "nothing in this run"  # first words for an effect that is on and changes nothing
-# Effects that act only through contacts: the kind of contact that they need ("": any), and the words if there is none.
+# Effects that act only through contacts: the kind of contact that they need ("": any), and the
+# words if there is none.
 _THROUGH_CONTACTS = {
     "wall_contacts": ("wall", "no body touches a wall"),
     "body_contacts": ("body", "no two separate bodies touch"),
     "self_collisions": ("tree", "no two links of one tree touch"),
 } | dict.fromkeys(
-    ("impulses", "unequal_restitution", "penalty_stiffness", "contact_damping", "friction", "clustering", "coherence"),
+    (
+        "impulses",
+        "unequal_restitution",
+        "penalty_stiffness",
+        "contact_damping",
+        "friction",
+        "clustering",
+        "coherence",
+    ),
     ("", "nothing touches"),
 )
 
 
-# What is measured of an effect. It has no numbers if it is off, cannot be left out, or if the scene cannot run without
-# it; in the last case `change` gives the reason.
+# What is measured of an effect. It has no numbers if it is off, cannot be left out, or if the scene
+# cannot run without it; in the last case `change` gives the reason.
 MEASURED = (
     "time saved [%]",  # share of the step that leaving the effect out saves; None within the noise
-    "position [mm]",  # largest distance of the tool (without a hand: of any body) from that with the effect
+    # largest distance of the tool (without a hand: of any body) from that with the effect
+    "position [mm]",
     "device [mm]",  # the same distance of the device
     "energy [%]",  # largest change of kinetic energy, relative to its largest value with the effect
     "cost",
@@ -95,7 +121,11 @@ def effects_of_scenes(
     """Return the measured effects of each shipped scene in the IAPB world."""
     names, found = scene_names(), dict[str, Table]()
     for name in counted(names, progress) if progress else names:
-        table = attempt(name, lambda name=name: effects_of(load_scene(find_scene(name)), failures=failures), failures)  # type: ignore[misc]
+        table = attempt(
+            name,
+            lambda name=name: effects_of(load_scene(find_scene(name)), failures=failures),
+            failures,
+        )  # type: ignore[misc]
         if table is not None:
             found[name] = table
     return found
@@ -106,8 +136,9 @@ def effects_of(
 ) -> Table:
     """Return every effect of a scene; effects that are on and can be left out are measured.
 
-    Step, all on: the time of the scene with its effects, and with all of SWITCHED on; the same in each row.
-    `failures` receives effects that raise an exception other than `IapbError`; if it is None, the exception propagates.
+    Step, all on: the time of the scene with its effects, and with all of SWITCHED on; the same in
+    each row. `failures` receives effects that raise an exception other than `IapbError`; if it is
+    None, the exception propagates.
     """
     chosen = find_world(world)
     effects = decide_effects(scene, chosen.law, chosen.coupling_in(scene))
@@ -118,17 +149,38 @@ def effects_of(
             loop = partial(_loop, scene, chosen, LEFT_OUT[effect.name])
             tried[effect.name] = attempt(f"{scene.name}, {effect.name}", loop, failures)
     loops = {name: loop for name, loop in tried.items() if isinstance(loop, Loop)}
-    times = take_turns({_WHOLE: whole.sample} | {name: loop.sample for name, loop in loops.items()}, rounds)
-    steps = {"step [µs]": 1e6 * times[_WHOLE].median, "all on [µs]": 1e6 * times[_ALL_ON].median,
-             "faster than real time [times]": scene.step / times[_WHOLE].median}
+    times = take_turns(
+        {_WHOLE: whole.sample} | {name: loop.sample for name, loop in loops.items()}, rounds
+    )
+    steps = {
+        "step [µs]": 1e6 * times[_WHOLE].median,
+        "all on [µs]": 1e6 * times[_ALL_ON].median,
+        "faster than real time [times]": scene.step / times[_WHOLE].median,
+    }
     measured: dict[str, Row] = {
-        name: difference(whole, loop, name, times[name].over(times[_WHOLE])) if isinstance(loop, Loop) else
-        {"change": f"without it no run: {loop}"} for name, loop in tried.items()
-        if loop is not None and name != _ALL_ON}  # fmt: skip
-    return table_from(({
-        "effect": effect.name, "active": effect.active, "reason": effect.reason, "left out": effect.left_out, **steps,
-        **dict.fromkeys(MEASURED), **measured.get(effect.name, {})} for effect in effects), digits=3,
-        timed=(*steps, "time saved", "cost"), prose=("reason", "left out", "cost", "change"))  # fmt: skip
+        name: difference(whole, loop, name, times[name].over(times[_WHOLE]))
+        if isinstance(loop, Loop)
+        else {"change": f"without it no run: {loop}"}
+        for name, loop in tried.items()
+        if loop is not None and name != _ALL_ON
+    }
+    return table_from(
+        (
+            {
+                "effect": effect.name,
+                "active": effect.active,
+                "reason": effect.reason,
+                "left out": effect.left_out,
+                **steps,
+                **dict.fromkeys(MEASURED),
+                **measured.get(effect.name, {}),
+            }
+            for effect in effects
+        ),
+        digits=3,
+        timed=(*steps, "time saved", "cost"),
+        prose=("reason", "left out", "cost", "change"),
+    )
 
 
 def _loop(scene: Scene, world: World, variant: Mapping[str, Any]) -> Loop | IapbError:
@@ -142,11 +194,12 @@ def _loop(scene: Scene, world: World, variant: Mapping[str, Any]) -> Loop | Iapb
 
 
 def saved(ratio: Times) -> float | None:
-    """Return the share of the step [%] that a loop saves; None if the difference is within the noise.
+    """Return the share of the step [%] that a loop saves; None if the difference is within the
+    noise.
 
-    `ratio` is the loop's time divided by the time with the effect, per round. The smallest and the largest ratio are
-    ignored. The difference is noise unless all other ratios are on the same side of 1. With nine rounds, pure noise
-    passes this test in one of 26 cases.
+    `ratio` is the loop's time divided by the time with the effect, per round. The smallest and the
+    largest ratio are ignored. The difference is noise unless all other ratios are on the same side
+    of 1. With nine rounds, pure noise passes this test in one of 26 cases.
     """
     rounds = sorted(ratio.samples)
     inner = rounds[1:-1] if len(rounds) > 2 else rounds
@@ -157,17 +210,30 @@ def summary(effects: Mapping[str, Table]) -> Table:
     """Return the data of the figure of time and error, one row per scene and measured effect."""
 
     def rows(scene: str, table: Table) -> Iterator[Row]:
-        measured = [(row["time saved"] or 0.0, row["position"], row["effect"]) for row in table.records()
-                    if row["position"] is not None]
+        measured = [
+            (row["time saved"] or 0.0, row["position"], row["effect"])
+            for row in table.records()
+            if row["position"] is not None
+        ]
         for time, error, effect in measured:
-            beaten = any(t >= time and e <= error and (t, e) != (time, error) for t, e, _ in measured)
-            yield {"scene": scene, "effect": effect, "time saved [%]": time, "error [mm]": error,
-                   "best of its error": "no" if beaten else "yes"}  # fmt: skip
+            beaten = any(
+                t >= time and e <= error and (t, e) != (time, error) for t, e, _ in measured
+            )
+            yield {
+                "scene": scene,
+                "effect": effect,
+                "time saved [%]": time,
+                "error [mm]": error,
+                "best of its error": "no" if beaten else "yes",
+            }
 
-    return table_from((row for given in effects.items() for row in rows(*given)), digits=3,
-                      timed=("time saved", "best of its error"),
-                      note="Best of its error: no other effect saves more time with no larger error, or as much "
-                      f"time with a smaller error. Time saved 0: {_BELOW}.")
+    return table_from(
+        (row for given in effects.items() for row in rows(*given)),
+        digits=3,
+        timed=("time saved", "best of its error"),
+        note="Best of its error: no other effect saves more time with no larger error, or as much "
+        f"time with a smaller error. Time saved 0: {_BELOW}.",
+    )
 
 
 def steps(effects: Mapping[str, Table]) -> Table:
@@ -176,26 +242,46 @@ def steps(effects: Mapping[str, Table]) -> Table:
     def row(scene: str, table: Table) -> Row:
         on = [row for row in table.records() if row["active"]]
         first = on[0]
-        shares = sorted(((row["time saved"], row["effect"]) for row in on if (row["time saved"] or 0.0) > 0.0),
-                        reverse=True)
-        told = ", ".join(f"{effect.replace('_', ' ')} {share:.0f} % ({0.01 * share * first['step']:.2g} µs)"
-                         for share, effect in shares)  # fmt: skip
-        return {"scene": scene, "effects on": len(on), "step [µs]": first["step"], "all on [µs]": first["all on"],
-                "faster than real time [times]": first["faster than real time"],
-                "shares of the step": told or f"each {_BELOW}"}  # fmt: skip
+        shares = sorted(
+            ((row["time saved"], row["effect"]) for row in on if (row["time saved"] or 0.0) > 0.0),
+            reverse=True,
+        )
+        told = ", ".join(
+            f"{effect.replace('_', ' ')} {share:.0f} % ({0.01 * share * first['step']:.2g} µs)"
+            for share, effect in shares
+        )
+        return {
+            "scene": scene,
+            "effects on": len(on),
+            "step [µs]": first["step"],
+            "all on [µs]": first["all on"],
+            "faster than real time [times]": first["faster than real time"],
+            "shares of the step": told or f"each {_BELOW}",
+        }
 
-    return table_from((row(*given) for given in effects.items()), digits=3, prose=("shares of the step",),
-                      timed=("step", "all on", "faster than real time", "shares of the step"),
-                      note=f"Medians of {ROUNDS} rounds. A share is the time that a step saves without the effect, "
-                      "also because the motion changes; so shares need not add up to 100 %. Effects that are not named "
-                      f"are {_BELOW} or cannot be left out.")
+    return table_from(
+        (row(*given) for given in effects.items()),
+        digits=3,
+        prose=("shares of the step",),
+        timed=("step", "all on", "faster than real time", "shares of the step"),
+        note=f"Medians of {ROUNDS} rounds. A share is the time that a step saves without the effect, "
+        "also because the motion changes; so shares need not add up to 100 %. Effects that are "
+        "not named "
+        f"are {_BELOW} or cannot be left out.",
+    )
 
 
 def difference(whole: Loop, other: Loop, name: str, ratio: Times) -> Row:
-    """Return the measured cells of one effect from the loops with it (`whole`) and without it (`other`)."""
+    """Return the measured cells of one effect from the loops with it (`whole`) and without it
+    (`other`)."""
     kinetic, share = whole.kinetic(), saved(ratio)
-    place, device = _farthest(whole.places(), other.places()), _farthest(whole.device_places(), other.device_places())
-    energy = 100.0 * float(np.abs(other.kinetic() - kinetic).max() / max(float(kinetic.max()), np.finfo(float).tiny))
+    place, device = (
+        _farthest(whole.places(), other.places()),
+        _farthest(whole.device_places(), other.device_places()),
+    )
+    energy = 100.0 * float(
+        np.abs(other.kinetic() - kinetic).max() / max(float(kinetic.max()), np.finfo(float).tiny)
+    )
     moved = f"position changes by up to {_length(place or 0.0)}"
     moved += f", the device's by {_length(device)}" if device is not None else ""
     change = f"{moved}; kinetic energy changes by up to {energy:.3g} % of its largest value"
@@ -214,19 +300,35 @@ def _length(millimetres: float) -> str:
 
 
 def _farthest(one: Floats, other: Floats) -> float | None:
-    """Return the largest distance of two arrays of points [mm]; None if they are empty or differ in shape."""
-    return 1e3 * float(np.linalg.norm(one - other, axis=-1).max()) if one.shape == other.shape and one.size else None
+    """Return the largest distance of two arrays of points [mm]; None if they are empty or differ in
+    shape."""
+    return (
+        1e3 * float(np.linalg.norm(one - other, axis=-1).max())
+        if one.shape == other.shape and one.size
+        else None
+    )
 
 
 class Loop(RecordedLoop):
-    """The simulation loop of a scene, or of a variant of it: with other values, without impulses or coupling, with
-    some switches turned on or off, or with the pairs of a kind (see `_leave_out_pairs`) untouched."""
+    """The simulation loop of a scene, or of a variant of it: with other values, without impulses or
+    coupling, with some switches turned on or off, or with the pairs of a kind (see
+    `_leave_out_pairs`) untouched."""
 
     def __init__(
-        self, scene: Scene, world: World, *, values: Mapping[str, Any] = MappingProxyType({}), impulses: bool = True,
-        coupled: bool = True, switches: Iterable[str] = (), on: bool = False, untouched: str = "",
-    ) -> None:  # fmt: skip
-        force = [0.0] * len(scene.hand.force) if scene.hand is not None else None  # zeros instead of a hand force
+        self,
+        scene: Scene,
+        world: World,
+        *,
+        values: Mapping[str, Any] = MappingProxyType({}),
+        impulses: bool = True,
+        coupled: bool = True,
+        switches: Iterable[str] = (),
+        on: bool = False,
+        untouched: str = "",
+    ) -> None:
+        force = (
+            [0.0] * len(scene.hand.force) if scene.hand is not None else None
+        )  # zeros instead of a hand force
         values = {name: force if name == "hand.force" else value for name, value in values.items()}
         changed = scene.with_values(values) if values else scene
         law = world.law if impulses else Penalty()
@@ -240,12 +342,16 @@ class Loop(RecordedLoop):
             self.simulation.world = block(engine.World(**given.members | {"switches": turned}))
 
     def same_motion(self, other: Loop) -> bool:
-        """Whether positions and velocities of tool and device are equal to the last bit in all steps."""
+        """Whether positions and velocities of tool and device are equal to the last bit in all
+        steps."""
         ours, theirs = (each.recording.joined("steps") for each in (self, other))
-        return all(np.array_equal(ours[name], theirs[name]) for name in ("q", "v", "device_q", "device_v"))
+        return all(
+            np.array_equal(ours[name], theirs[name]) for name in ("q", "v", "device_q", "device_v")
+        )
 
     def touching(self) -> set[str]:
-        """Return the kinds of contacts in the last sample: "wall", "body" (two trees) and "tree" (within one tree)."""
+        """Return the kinds of contacts in the last sample: "wall", "body" (two trees) and "tree"
+        (within one tree)."""
         contacts = self.recording.joined("contacts")
         a, b = contacts["body_a"], contacts["body_b"]
         tree = self.simulation.system.mechanism.tree_of_body
@@ -258,23 +364,36 @@ class Loop(RecordedLoop):
         return found
 
     def places(self) -> Floats:
-        """Return points of the held body, or of all bodies without a hand, at the compared instants (n, k, 3) [m].
+        """Return points of the held body, or of all bodies without a hand, at the compared instants
+        (n, k, 3) [m].
 
-        Four of each body: its centre of mass, and points one radius of gyration away along its axes. The body's origin
-        is not enough, because the origin of a hinged body lies in the hinge and never moves.
+        Four of each body: its centre of mass, and points one radius of gyration away along its
+        axes. The body's origin is not enough, because the origin of a hinged body lies in the hinge
+        and never moves.
         """
-        held, mechanism, found = self.simulation.port.hand_body, self.simulation.system.mechanism, []
+        held, mechanism, found = (
+            self.simulation.port.hand_body,
+            self.simulation.system.mechanism,
+            [],
+        )
         bodies, states = slice(None) if held < 0 else slice(held, held + 1), self.states("q")
         for q in states:
-            for body, R, p in zip(*(each[bodies] for each in (mechanism.bodies, *mechanism.placements(q))),
-                                  strict=True):  # fmt: skip
-                radius = float(np.sqrt(np.trace(body.inertia) / (2.0 * body.mass))) if body.mass > 0.0 else 0.0
+            for body, R, p in zip(
+                *(each[bodies] for each in (mechanism.bodies, *mechanism.placements(q))),
+                strict=True,
+            ):
+                radius = (
+                    float(np.sqrt(np.trace(body.inertia) / (2.0 * body.mass)))
+                    if body.mass > 0.0
+                    else 0.0
+                )
                 center = p + R @ np.asarray(body.center_of_mass)
                 found.append((center, *(center + radius * R.T)))
         return np.array(found).reshape(len(states), -1, 3)
 
     def device_places(self) -> Floats:
-        """Return positions of the device's bodies at the compared instants (n, k, 3) [m]; empty without a device."""
+        """Return positions of the device's bodies at the compared instants (n, k, 3) [m]; empty
+        without a device."""
         if self.simulation.coupling.name == "none":
             return np.zeros((0, 0, 3))
         device = self.simulation.system.device_mechanism()
@@ -282,12 +401,16 @@ class Loop(RecordedLoop):
 
     def kinetic(self) -> Floats:
         """Return the kinetic energy at the compared instants (n,) [J]."""
-        states, energy = zip(self.states("q"), self.states("v"), strict=True), self.simulation.system.mechanism
+        states, energy = (
+            zip(self.states("q"), self.states("v"), strict=True),
+            self.simulation.system.mechanism,
+        )
         return np.array([energy.kinetic_energy(q, v) for q, v in states])
 
 
 def _leave_out_pairs(simulation: Any, kind: str) -> None:
-    """Remove the pairs of shapes with a wall (`kind` "wall"), or the pairs of two trees ("body")."""
+    """Remove the pairs of shapes with a wall (`kind` "wall"), or the pairs of two trees
+    ("body")."""
     system = simulation.system
     bodies, tree = system.shapes.body, system.mechanism.tree_of_body
     a, b = bodies[system.pairs[:, 0]], bodies[system.pairs[:, 1]]

@@ -1,7 +1,8 @@
-"""The Newton LCP solved by Lemke's method, compiled from M, J, v to v⁺, for a comparison with the engine's kernel.
+"""The Newton LCP solved by Lemke's method, compiled from M, J, v to v⁺, for a comparison with the
+engine's kernel.
 
-The code has plain loops, as the engine's kernels have, because numba takes ten times as long to compile numpy's linear
-algebra.
+The code has plain loops, as the engine's kernels have, because numba takes ten times as long to
+compile numpy's linear algebra.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ lcp_lemke = import_lcp_lemke()
 
 @njit(cache=True)
 def repeat_lemke(mass_matrix, rows, v, restitution, v_plus, times):  # type: ignore[no-untyped-def]
-    """Resolve the impact of v on rows (c, d) `times` times; write v⁺ (d,), NaN if Lemke's method fails."""
+    """Resolve the impact of v on rows (c, d) `times` times; write v⁺ (d,), NaN if Lemke's method
+    fails."""
     c, d = rows.shape
     lower, whitened = np.zeros((d, d)), np.zeros((c, d))
     delassus, offset = np.zeros((c, c)), np.zeros(c)

@@ -1,4 +1,5 @@
-"""Impacts that are timed: random ones, a patch of redundant contacts, and a pile of independent ones."""
+"""Impacts that are timed: random ones, a patch of redundant contacts, and a pile of independent
+ones."""
 
 from __future__ import annotations
 
@@ -8,7 +9,8 @@ from iapb.errors import IapbError
 from verification.impacts import RANK_CUT, ImpactCase
 
 _DRAWS = 1000  # most draws of a patch
-_AGREE = 1e-9  # largest difference of two equal changes of velocity, relative to |v⁻|, in the kinetic metric
+# largest difference of two equal changes of velocity, relative to |v⁻|, in the kinetic metric
+_AGREE = 1e-9
 
 
 def random_impact(d: int, c: int, rng: np.random.Generator, restitution: float = 0.5) -> ImpactCase:
@@ -19,10 +21,12 @@ def random_impact(d: int, c: int, rng: np.random.Generator, restitution: float =
 
 
 def patch(contacts: int, rng: np.random.Generator) -> ImpactCase:
-    """Return an impact of a slightly rotating box on `contacts` points of its lower face: d = 6, rank at most 3.
+    """Return an impact of a slightly rotating box on `contacts` points of its lower face: d = 6,
+    rank at most 3.
 
-    Points are drawn again until impulses that only push give the velocity of the equalities. Otherwise IAPB and the
-    complementarity solvers would resolve the impact differently, and their times would not compare.
+    Points are drawn again until impulses that only push give the velocity of the equalities.
+    Otherwise IAPB and the complementarity solvers would resolve the impact differently, and their
+    times would not compare.
     """
     from scipy.optimize import nnls
 
@@ -36,11 +40,14 @@ def patch(contacts: int, rng: np.random.Generator) -> ImpactCase:
         change = -np.linalg.lstsq(case.rows, case.rows @ u, rcond=RANK_CUT)[0]
         if nnls(case.rows.T, change)[1] <= _AGREE * np.linalg.norm(u):
             return case
-    raise IapbError(f"no patch of {contacts} contacts in {_DRAWS} draws on which impulses only push")
+    raise IapbError(
+        f"no patch of {contacts} contacts in {_DRAWS} draws on which impulses only push"
+    )
 
 
 def pile(contacts: int, rng: np.random.Generator) -> ImpactCase:
-    """Return an impact of a stack of planar boxes with two contacts between neighbours, all approaching."""
+    """Return an impact of a stack of planar boxes with two contacts between neighbours, all
+    approaching."""
     boxes = (contacts + 1) // 2
     rows = np.zeros((contacts, 3 * boxes))
     for i in range(contacts):

@@ -1,7 +1,7 @@
 """Three scenes at rest in contact, without friction.
 
-All steps of an engine do the same work, without impulses or events. The hand's force acts at the centre of mass of the
-body that it holds. The files are in the folder `scenes` beside this module.
+All steps of an engine do the same work, without impulses or events. The hand's force acts at the
+centre of mass of the body that it holds. The files are in the folder `scenes` beside this module.
 """
 
 from __future__ import annotations

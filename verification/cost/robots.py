@@ -1,7 +1,8 @@
-"""Time of the mass matrix and the bias, per call and for many states in one call, compared with Pinocchio in Python.
+"""Time of the mass matrix and the bias, per call and for many states in one call, compared with
+Pinocchio in Python.
 
-Pinocchio is called in its fastest form, a bound function whose result is discarded. Both sides take turns, so that a
-slow phase of the machine affects both; the ratio of each round is compared.
+Pinocchio is called in its fastest form, a bound function whose result is discarded. Both sides take
+turns, so that a slow phase of the machine affects both; the ratio of each round is compared.
 """
 
 from __future__ import annotations
@@ -35,18 +36,35 @@ def time_robot(study: Study, name: str) -> Iterator[Row]:
     qs, vs = (np.array(rows) for rows in zip(*states, strict=True))
     their_mass, their_bias = model_from_urdf(FILES[name]).calls()
     places = [(q,) for q, _ in states]
-    one = (("mass matrix", mechanism.mass_matrix, their_mass, places), ("bias", mechanism.bias, their_bias, states))
-    many = {"mass matrix": lambda: mechanism.mass_matrices(qs), "bias": lambda: mechanism.biases(qs, vs)}
+    one = (
+        ("mass matrix", mechanism.mass_matrix, their_mass, places),
+        ("bias", mechanism.bias, their_bias, states),
+    )
+    many = {
+        "mass matrix": lambda: mechanism.mass_matrices(qs),
+        "bias": lambda: mechanism.biases(qs, vs),
+    }
     for form in LIMITS:
         for quantity, ours, theirs, given in one:
-            calls = {"ours": partial(_for_each, ours, given) if form == ONE else many[quantity],
-                     "theirs": partial(_for_each, theirs, given)}  # fmt: skip
-            times = take_turns({who: partial(seconds, call) for who, call in calls.items()}, ROUNDS[study.depth])
+            calls = {
+                "ours": partial(_for_each, ours, given) if form == ONE else many[quantity],
+                "theirs": partial(_for_each, theirs, given),
+            }
+            times = take_turns(
+                {who: partial(seconds, call) for who, call in calls.items()}, ROUNDS[study.depth]
+            )
             ratio = times["ours"].over(times["theirs"])
-            yield {"robot": name, "velocities": mechanism.nv, "quantity": quantity, "form": form,
-                   "ours [µs]": 1e6 / STATES * times["ours"].median,
-                   "Pinocchio [µs]": 1e6 / STATES * times["theirs"].median, "ratio": ratio.median,
-                   "lower quartile": ratio.lower, "upper quartile": ratio.upper}  # fmt: skip
+            yield {
+                "robot": name,
+                "velocities": mechanism.nv,
+                "quantity": quantity,
+                "form": form,
+                "ours [µs]": 1e6 / STATES * times["ours"].median,
+                "Pinocchio [µs]": 1e6 / STATES * times["theirs"].median,
+                "ratio": ratio.median,
+                "lower quartile": ratio.lower,
+                "upper quartile": ratio.upper,
+            }
 
 
 def _for_each(call: Callable[..., object], given: Sequence[tuple[object, ...]]) -> None:
@@ -61,16 +79,30 @@ def _robots_say(table: Table) -> Iterator[Part]:
     for form, limit in LIMITS.items():
         rows = table.where(form=form).records() if table.rows else []
         if not rows:
-            yield Part(f"Mass matrix and bias compared with Pinocchio, {form}: not timed.", NOT_COMPUTED, timed=True)
+            yield Part(
+                f"Mass matrix and bias compared with Pinocchio, {form}: not timed.",
+                NOT_COMPUTED,
+                timed=True,
+            )
             continue
         worst = max(rows, key=lambda row: float(row["ratio"]))
         count = len({row["robot"] for row in rows})
-        yield limited(f"the {_WORDS[worst['quantity']]} of the robot {worst['robot']}, {form}, takes", worst["ratio"],
-                      limit, " times as long as Pinocchio's", f" (the largest over M and B of {count} {table.note})")
+        yield limited(
+            f"the {_WORDS[worst['quantity']]} of the robot {worst['robot']}, {form}, takes",
+            worst["ratio"],
+            limit,
+            " times as long as Pinocchio's",
+            f" (the largest over M and B of {count} {table.note})",
+        )
 
 
 ROBOTS = Check(
-    key="robots", question="How long do M and B take, compared with Pinocchio?", cases=lambda _: FILES, row=time_robot,
-    says=_robots_say, timed=("ours", "Pinocchio", "ratio", "lower quartile", "upper quartile"), digits=3,
+    key="robots",
+    question="How long do M and B take, compared with Pinocchio?",
+    cases=lambda _: FILES,
+    row=time_robot,
+    says=_robots_say,
+    timed=("ours", "Pinocchio", "ratio", "lower quartile", "upper quartile"),
+    digits=3,
     note="test robots of other projects" if OTHERS else "test robots of this project",
-)  # fmt: skip
+)

@@ -1,8 +1,8 @@
 """Time of a step against MuJoCo, and over the number of bodies.
 
 Our loop is `Simulation.advance_chunk`, as in `simulate`, and records every step. MuJoCo's loop is
-`mj_step(model, data, nstep)`, which records nothing. Both run the same number of steps in turns; each round gives one
-ratio. All solvers of MuJoCo are timed, and the fastest one counts.
+`mj_step(model, data, nstep)`, which records nothing. Both run the same number of steps in turns;
+each round gives one ratio. All solvers of MuJoCo are timed, and the fastest one counts.
 """
 
 from __future__ import annotations
@@ -33,7 +33,8 @@ IDEAL = "ideal (QP per step)"  # in tables of times
 
 
 class RecordedLoop:
-    """The loop of `simulate`, with its record; it starts again from the first state for every sample of `steps` steps.
+    """The loop of `simulate`, with its record; it starts again from the first state for every
+    sample of `steps` steps.
 
     recording : the Recorder of the last sample
     """
@@ -43,7 +44,8 @@ class RecordedLoop:
         self.recording: Recorder
 
     def sample(self) -> float:
-        """Return the time per step of one whole run [s]; raise the error that stops the run before its end."""
+        """Return the time per step of one whole run [s]; raise the error that stops the run before
+        its end."""
         simulation, system = self.simulation, self.simulation.system
         simulation.state, simulation.steps_done = system.make_state(), 0
         simulation.port = system.make_port(simulation.coupling)
@@ -65,54 +67,83 @@ def _record(simulation: Any, steps: int) -> Any:
 
 # Against MuJoCo
 
-STEPS, ROUNDS = 512, {"quick": 9, "full": 20}  # steps of one sample, as in a chunk of `simulate`; samples of each loop
+STEPS, ROUNDS = (
+    512,
+    {"quick": 9, "full": 20},
+)  # steps of one sample, as in a chunk of `simulate`; samples of each loop
 SOLVERS = ("Newton", "CG", "PGS")
 TARGETS = {"peg in the corner": 0.1}
 SPATIAL_TARGET = 0.5
-_DRIFT, STILL = "iapb's drift", 1e-6  # [m, rad] a scene that moves less while it is timed is at rest
+_DRIFT, STILL = (
+    "iapb's drift",
+    1e-6,
+)  # [m, rad] a scene that moves less while it is timed is at rest
 
 
 def race(study: Study, name: str, steps: int = STEPS) -> Iterator[Row]:
     """Yield the times of a step of one scene against MuJoCo's, with every solver."""
     ours = OwnLoop(RESTING[name], steps)
     theirs = {solver: TheirLoop(RESTING[name], solver, steps) for solver in SOLVERS}
-    times = take_turns({"ours": ours.sample, **{key: other.sample for key, other in theirs.items()}},
-                       ROUNDS[study.depth])  # fmt: skip
+    times = take_turns(
+        {"ours": ours.sample, **{key: other.sample for key, other in theirs.items()}},
+        ROUNDS[study.depth],
+    )
     for solver, other in theirs.items():
         ratio = times["ours"].over(times[solver])
-        yield {"scene": name, "MuJoCo's solver": solver, "iapb's contacts": ours.contacts,
-               "MuJoCo's contacts": other.contacts, "MuJoCo's step [µs]": 1e6 * times[solver].median,
-               "ratio": ratio.median, "quartiles": f"{ratio.lower:.2g} to {ratio.upper:.2g}",
-               "target": TARGETS.get(name, SPATIAL_TARGET), "iapb's drift": ours.moved,
-               "MuJoCo's drift": other.moved}  # fmt: skip
+        yield {
+            "scene": name,
+            "MuJoCo's solver": solver,
+            "iapb's contacts": ours.contacts,
+            "MuJoCo's contacts": other.contacts,
+            "MuJoCo's step [µs]": 1e6 * times[solver].median,
+            "ratio": ratio.median,
+            "quartiles": f"{ratio.lower:.2g} to {ratio.upper:.2g}",
+            "target": TARGETS.get(name, SPATIAL_TARGET),
+            "iapb's drift": ours.moved,
+            "MuJoCo's drift": other.moved,
+        }
 
 
 def hardest(races: Table) -> list[Row]:
     """Return per scene the row of MuJoCo's fastest solver."""
     fastest: dict[str, Row] = {}
-    for row in sorted(races.records() if races.rows else (), key=lambda row: float(row["MuJoCo's step"])):
+    for row in sorted(
+        races.records() if races.rows else (), key=lambda row: float(row["MuJoCo's step"])
+    ):
         fastest.setdefault(row["scene"], row)
     return list(fastest.values())
 
 
 def _races_say(races: Table) -> Iterator[Part]:
     if not races.rows:
-        yield Part(f"Time of a step compared with MuJoCo: MuJoCo is not installed: {installing('reference')}.",
-                   NOT_COMPUTED, timed=True)
+        yield Part(
+            f"Time of a step compared with MuJoCo: MuJoCo is not installed: {installing('reference')}.",
+            NOT_COMPUTED,
+            timed=True,
+        )
     for worst in hardest(races):
         moved = worst.get(_DRIFT) or 0.0
         rest = "at rest" if moved < STILL else f"nearly at rest (moving by {moved:.1g} rad)"
-        yield limited(f"with the {worst['scene']} {rest}, our step takes", worst["ratio"], worst["target"],
-                      " times as long as MuJoCo's", " (MuJoCo: solver {MuJoCo's solver}, "
-                      "{MuJoCo's contacts:.0f} contacts; engine: {iapb's contacts:.0f} "
-                      "contacts)".format_map(worst))  # fmt: skip
+        yield limited(
+            f"with the {worst['scene']} {rest}, our step takes",
+            worst["ratio"],
+            worst["target"],
+            " times as long as MuJoCo's",
+            " (MuJoCo: solver {MuJoCo's solver}, "
+            "{MuJoCo's contacts:.0f} contacts; engine: {iapb's contacts:.0f} "
+            "contacts)".format_map(worst),
+        )
 
 
 class OwnLoop:
     """The scene in our loop; every sample starts again and settles before the timed steps."""
 
     def __init__(self, scene: RestingScene, steps: int) -> None:
-        self.simulation, self.settling, self.steps = Simulation(scene.scene()), scene.settling, steps
+        self.simulation, self.settling, self.steps = (
+            Simulation(scene.scene()),
+            scene.settling,
+            steps,
+        )
         self.contacts = self.moved = 0.0
 
     def sample(self) -> float:
@@ -125,9 +156,13 @@ class OwnLoop:
         return spent / self.steps
 
     def _settled(self) -> Any:
-        """Start from the first state, simulate until the scene is at rest, and return an empty record."""
+        """Start from the first state, simulate until the scene is at rest, and return an empty
+        record."""
         simulation, system = self.simulation, self.simulation.system
-        simulation.state, simulation.port = system.make_state(), system.make_port(simulation.coupling)
+        simulation.state, simulation.port = (
+            system.make_state(),
+            system.make_port(simulation.coupling),
+        )
         simulation.advance_chunk(_record(simulation, self.settling), self.settling)
         return _record(simulation, self.steps)
 
@@ -160,15 +195,22 @@ class TheirLoop:
 
 
 RACES = Check(
-    key="steps against MuJoCo", question="How long is a step, compared with MuJoCo's?", row=race, says=_races_say,
-    cases=lambda _: RESTING if find_spec("mujoco") else (), digits=3,
+    key="steps against MuJoCo",
+    question="How long is a step, compared with MuJoCo's?",
+    row=race,
+    says=_races_say,
+    cases=lambda _: RESTING if find_spec("mujoco") else (),
+    digits=3,
     timed=("MuJoCo's step", "ratio", "quartiles", "iapb's drift", "MuJoCo's drift"),
     note="Both engines simulate the same masses, forces and time step (peg: 1/512 s, others 1 ms) without friction. "
-    "MuJoCo runs with each of its solvers, otherwise with the settings of the world mujoco; the findings name its "
+    "MuJoCo runs with each of its solvers, otherwise with the settings of the world mujoco; the "
+    "findings name its "
     "fastest solver. Ratio: "
-    "time of iapb's step, which includes its recording, over that of MuJoCo's step; median of the rounds. Contacts: "
-    "means over the timed steps. Drift: the largest change of a coordinate during the timed steps [m, rad].",
-)  # fmt: skip
+    "time of iapb's step, which includes its recording, over that of MuJoCo's step; median of the "
+    "rounds. Contacts: "
+    "means over the timed steps. Drift: the largest change of a coordinate during the timed steps "
+    "[m, rad].",
+)
 
 
 # Many bodies
@@ -176,7 +218,11 @@ RACES = Check(
 COUNTS = (1, 2, 5, 10, 20, 50, 100, 200)
 LEAST_BODIES = 20  # with fewer, overhead hides the growth
 RADIUS, PITCH = 0.02, 0.046  # [m]: discs on a square grid with 6 mm between them
-CHUNKS, CHUNK_STEPS, REPEATS = 50, 10, 3  # short chunks, so that each chunk has an undisturbed repeat
+CHUNKS, CHUNK_STEPS, REPEATS = (
+    50,
+    10,
+    3,
+)  # short chunks, so that each chunk has an undisturbed repeat
 LARGEST_POWER = 1.2  # target
 
 
@@ -190,15 +236,24 @@ def field_of_discs(n: int) -> str:
         f"velocity: [{0.3 * rng.normal():.6f}, {0.3 * rng.normal():.6f}, 0]}}"
         for k in range(n)
     ]
-    return "\n".join([
-        "name: field_of_discs", "rate: 1000", "duration: 1", "bodies:", *bodies, "walls:",
-        "  - {name: wall, kind: half_plane, point: [0, -0.03], normal: [0, 1]}",
-        "contact: {forces: paper, stiffness: 500, damping: 1, restitution: 0.5, coherence_distance: 1e-3}", "",
-    ])  # fmt: skip
+    return "\n".join(
+        [
+            "name: field_of_discs",
+            "rate: 1000",
+            "duration: 1",
+            "bodies:",
+            *bodies,
+            "walls:",
+            "  - {name: wall, kind: half_plane, point: [0, -0.03], normal: [0, 1]}",
+            "contact: {forces: paper, stiffness: 500, damping: 1, restitution: 0.5, coherence_distance: 1e-3}",
+            "",
+        ]
+    )
 
 
 def step_of_bodies(study: Study, n: int) -> Row:
-    """Time the same steps several times; each chunk counts with its least time, as other processes only add time."""
+    """Time the same steps several times; each chunk counts with its least time, as other processes
+    only add time."""
     simulation = Simulation(scene_from_text(field_of_discs(n)))
     simulation.advance_chunk(_record(simulation, 1), 1)  # compiles
     quickest = [math.inf] * CHUNKS
@@ -211,12 +266,18 @@ def step_of_bodies(study: Study, n: int) -> Row:
             quickest[k] = min(quickest[k], spent)
             contacts += float(record.steps.contact_count.mean()) / CHUNKS
             tested += _tested(simulation) / CHUNKS
-    return {"bodies": n, "step [µs]": 1e6 * sum(quickest) / (CHUNKS * CHUNK_STEPS), "contacts": contacts,
-            "pairs of shapes": len(simulation.world.pairs), "pairs tested": tested}  # fmt: skip
+    return {
+        "bodies": n,
+        "step [µs]": 1e6 * sum(quickest) / (CHUNKS * CHUNK_STEPS),
+        "contacts": contacts,
+        "pairs of shapes": len(simulation.world.pairs),
+        "pairs tested": tested,
+    }
 
 
 def _tested(simulation: Simulation) -> int:
-    """Return the number of pairs that the narrow phase tests at the current positions of the bodies."""
+    """Return the number of pairs that the narrow phase tests at the current positions of the
+    bodies."""
     world, body = simulation.world, simulation.state.body
     if not world.broad_phase.used:
         return len(world.pairs)
@@ -225,21 +286,43 @@ def _tested(simulation: Simulation) -> int:
 
 def _bodies_say(table: Table) -> Iterator[Part]:
     rows = [row for row in table.records() if row["bodies"] >= LEAST_BODIES]
-    bodies, times, pairs = ([row[key] for row in rows] for key in ("bodies", "step", "pairs tested"))
+    bodies, times, pairs = (
+        [row[key] for row in rows] for key in ("bodies", "step", "pairs tested")
+    )
     power, more = power_law(bodies, times), ""
     if len(rows) > 2:
         low, high, slope = steepest(bodies, times)
-        more = f"; the time grows fastest from {low:g} to {high:g} bodies, with the power {slope:.2f}"
-    yield limited(f"from {LEAST_BODIES} free bodies on, the time of a step grows as the number of bodies to the "
-                  "power", power,
-                  LARGEST_POWER, "", more)  # fmt: skip
+        more = (
+            f"; the time grows fastest from {low:g} to {high:g} bodies, with the power {slope:.2f}"
+        )
+    yield limited(
+        f"from {LEAST_BODIES} free bodies on, the time of a step grows as the number of bodies to "
+        f"the "
+        "power",
+        power,
+        LARGEST_POWER,
+        "",
+        more,
+    )
     last = rows[-1]
-    yield limited("the number of tested pairs of shapes grows as the number of bodies to the power",
-                  power_law(bodies, pairs), LARGEST_POWER, "", f" ({last['pairs tested']:.0f} of "
-                  f"{last['pairs of shapes']:,} pairs for {last['bodies']} free bodies)", timed=False)  # fmt: skip
+    yield limited(
+        "the number of tested pairs of shapes grows as the number of bodies to the power",
+        power_law(bodies, pairs),
+        LARGEST_POWER,
+        "",
+        f" ({last['pairs tested']:.0f} of "
+        f"{last['pairs of shapes']:,} pairs for {last['bodies']} free bodies)",
+        timed=False,
+    )
 
 
 BODIES = Check(
-    key="bodies", question="How does the time of a step grow with the number of free bodies?", cases=lambda _: COUNTS,
-    row=step_of_bodies, says=_bodies_say, timed=("step",), digits=3, note="Discs near a wall. Contacts: means.",
-)  # fmt: skip
+    key="bodies",
+    question="How does the time of a step grow with the number of free bodies?",
+    cases=lambda _: COUNTS,
+    row=step_of_bodies,
+    says=_bodies_say,
+    timed=("step",),
+    digits=3,
+    note="Discs near a wall. Contacts: means.",
+)

@@ -1,4 +1,5 @@
-"""Named impacts and motions on which solvers fail, each with source, reason, exact truth and a verdict per method."""
+"""Named impacts and motions on which solvers fail, each with source, reason, exact truth and a
+verdict per method."""
 
 from verification.hard_cases.case import HardCase as HardCase
 from verification.hard_cases.case import TrajectoryCase as TrajectoryCase

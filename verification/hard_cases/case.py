@@ -20,8 +20,11 @@ from verification.impacts import Floats
 
 Exact = NDArray[np.object_] | Floats
 
-NEWTON_COULOMB = "Newton with Coulomb"  # Newton's law with Coulomb friction, as in Kane and Levinson
-COULOMB = "ideal with friction"  # the rigid world with Coulomb friction; the paper's rigid worlds have none
+NEWTON_COULOMB = (
+    "Newton with Coulomb"  # Newton's law with Coulomb friction, as in Kane and Levinson
+)
+# the rigid world with Coulomb friction; the paper's rigid worlds have none
+COULOMB = "ideal with friction"
 RESTITUTION_TOLERANCE = 1e-8  # the tolerance of the kit for all resolvers
 NO_GAIN = 1e-12  # rounding of the sums of energies over the run's steps
 STABLE, DEPENDS_ON_ROUNDING, NOT_TRIED = "stable", "depends on rounding", "not tried"
@@ -29,7 +32,8 @@ STABLE, DEPENDS_ON_ROUNDING, NOT_TRIED = "stable", "depends on rounding", "not t
 
 @dataclass(frozen=True)
 class Truth:
-    """The exact outcome: v⁺ (d fractions), rank, κ(M), κ of M scaled to a unit diagonal, κ(A) of the exact rows."""
+    """The exact outcome: v⁺ (d fractions), rank, κ(M), κ of M scaled to a unit diagonal, κ(A) of
+    the exact rows."""
 
     velocity: tuple[Fraction, ...]
     rank: int
@@ -44,11 +48,14 @@ class HardCase:
 
     Attributes
     ----------
-    name, source, why_hard, expected : texts for the report; `expected` is the outcome of a correct method.
+    name, source, why_hard, expected : texts for the report; `expected` is the outcome of a correct
+        method.
     mass_matrix, contact_jacobian, velocity : arguments of the resolver, in doubles.
     restitution : scalar, or one e per contact (Poisson's law).
-    exact_jacobian : (c, d) fractions if the doubles are rounded geometry; None if the doubles are exact.
-    well_posed : False if the exact answer depends on digits that doubles do not have; then v⁺ is not judged.
+    exact_jacobian : (c, d) fractions if the doubles are rounded geometry; None if the doubles are
+        exact.
+    well_posed : False if the exact answer depends on digits that doubles do not have; then v⁺ is
+        not judged.
     methods : names of the methods to judge; None for all methods.
     """
 
@@ -63,8 +70,11 @@ class HardCase:
     exact_jacobian: Exact | None = field(default=None)
     well_posed: bool = True
     methods: tuple[str, ...] | None = None
-    law: ClassVar[str] = ("the velocity by equation (21), in exact fractions; if e differs between contacts, the "
-                          "velocity by Poisson's law (impulse of the rebound = e times the impulse of the compression)")
+    law: ClassVar[str] = (
+        "the velocity by equation (21), in exact fractions; if e differs between contacts, the "
+        "velocity by Poisson's law (impulse of the rebound = e times the impulse of the "
+        "compression)"
+    )
 
     @property
     def meant_jacobian(self) -> Exact:
@@ -73,12 +83,14 @@ class HardCase:
 
     @property
     def all_rows(self) -> Exact:
-        """All rows that carry an impulse, tangents included; their condition number bounds the error of v⁺."""
+        """All rows that carry an impulse, tangents included; their condition number bounds the
+        error of v⁺."""
         return self.meant_jacobian
 
     @cached_property
     def truth(self) -> Truth:
-        """Exact v⁺ of the case's law, with the condition numbers that bound the error of v⁺ in doubles."""
+        """Exact v⁺ of the case's law, with the condition numbers that bound the error of v⁺ in
+        doubles."""
         velocity, rank = self.exact_outcome()
         scale = 1.0 / np.sqrt(np.diag(self.mass_matrix))
         scaled = condition_number(scale[:, None] * self.mass_matrix * scale)
@@ -86,7 +98,8 @@ class HardCase:
         return Truth(velocity, rank, condition_number(self.mass_matrix), scaled, rows)
 
     def exact_outcome(self) -> tuple[tuple[Fraction, ...], int]:
-        """Return v⁺ and rank by (21); for one e per contact, v⁺ and the number of pushing contacts by Poisson's law."""
+        """Return v⁺ and rank by (21); for one e per contact, v⁺ and the number of pushing contacts
+        by Poisson's law."""
         mass, rows = self.mass_matrix, self.meant_jacobian
         if np.ndim(self.restitution):
             return exact_poisson(mass, rows, self.velocity, np.asarray(self.restitution))
@@ -100,8 +113,11 @@ class FrictionalCase(HardCase):
 
     tangent: Floats = field(kw_only=True)
     friction: float = field(kw_only=True)
-    law = ("Newton's restitution law with Coulomb friction, in exact fractions and ball arithmetic. If these laws gain "
-           "energy, the friction impulse is scaled down until the gain is zero")
+    law = (
+        "Newton's restitution law with Coulomb friction, in exact fractions and ball arithmetic. "
+        "If these laws gain "
+        "energy, the friction impulse is scaled down until the gain is zero"
+    )
 
     @property
     def all_rows(self) -> Exact:
@@ -111,8 +127,14 @@ class FrictionalCase(HardCase):
     @property
     def impact(self) -> FrictionalImpact:
         """The impact in rational arithmetic."""
-        return FrictionalImpact(self.mass_matrix, self.contact_jacobian, self.tangent, self.velocity,
-                                float(self.restitution), self.friction)  # fmt: skip
+        return FrictionalImpact(
+            self.mass_matrix,
+            self.contact_jacobian,
+            self.tangent,
+            self.velocity,
+            float(self.restitution),
+            self.friction,
+        )
 
     def exact_outcome(self) -> tuple[tuple[Fraction, ...], int]:
         """Return v⁺, exact except for the certified root, and the rank 1."""
@@ -127,7 +149,8 @@ class Measured:
     Attributes
     ----------
     energy_gain, energy_bound : see `largest_gain`.
-    error : relative distance of the run from the law; error_bound : error that the time step may cause.
+    error : relative distance of the run from the law; error_bound : error that the time step may
+        cause.
     """
 
     energy_gain: float
@@ -163,35 +186,66 @@ AnyCase = HardCase | TrajectoryCase
 
 
 def on_floor(
-    name: str, title: str, bodies: list[dict[str, Any]], contact: dict[str, Any], *, duration: float,
-    source: str = "textbook", rate: float = 1000.0, gravity: tuple[float, float] | None = (0.0, -9.81),
-    level: float = 0.0, **more: Any,
-) -> Scene:  # fmt: skip
-    """Return a scene in the plane with the paper's forces; `more` are other sections, such as walls in place of the
-    floor at a level [m]."""
+    name: str,
+    title: str,
+    bodies: list[dict[str, Any]],
+    contact: dict[str, Any],
+    *,
+    duration: float,
+    source: str = "textbook",
+    rate: float = 1000.0,
+    gravity: tuple[float, float] | None = (0.0, -9.81),
+    level: float = 0.0,
+    **more: Any,
+) -> Scene:
+    """Return a scene in the plane with the paper's forces; `more` are other sections, such as walls
+    in place of the floor at a level [m]."""
     floor = {"name": "floor", "kind": "half_plane", "point": [0.0, level], "normal": [0.0, 1.0]}
-    given = {"name": name, "title": title, "source": source, "rate": rate, "duration": duration, "gravity": gravity,
-             "bodies": bodies, "walls": [floor], "contact": {"forces": "paper", **contact}, **more}  # fmt: skip
+    given = {
+        "name": name,
+        "title": title,
+        "source": source,
+        "rate": rate,
+        "duration": duration,
+        "gravity": gravity,
+        "bodies": bodies,
+        "walls": [floor],
+        "contact": {"forces": "paper", **contact},
+        **more,
+    }
     return scene_from_text(json.dumps(given))
 
 
 def ball(name: str, radius: float, at: float, **more: Any) -> dict[str, Any]:
     """Return a ball of 1 kg that moves along x [m]; `more` are other fields of the body."""
-    return {"name": name, "joint": "prismatic", "axis": [1, 0], "mass": 1.0, "position": [at],
-            "shapes": [{"kind": "circle", "radius": radius}], **more}  # fmt: skip
+    return {
+        "name": name,
+        "joint": "prismatic",
+        "axis": [1, 0],
+        "mass": 1.0,
+        "position": [at],
+        "shapes": [{"kind": "circle", "radius": radius}],
+        **more,
+    }
 
 
 def largest_gain(run: Run) -> float:
     """Return the largest relative energy gain of a run.
 
-    The gain is the change of the kinetic energy of tool and device and of the tool's potential energy, minus the hand's
-    work on both. It is divided by the initial kinetic energy plus the largest work of the hand plus the largest drop of
-    potential energy. The springs of walls and coupling also store energy, and this energy is never negative. Therefore
-    a positive gain is energy that the simulation has created.
+    The gain is the change of the kinetic energy of tool and device and of the tool's potential
+    energy, minus the hand's work on both. It is divided by the initial kinetic energy plus the
+    largest work of the hand plus the largest drop of potential energy. The springs of walls and
+    coupling also store energy, and this energy is never negative. Therefore a positive gain is
+    energy that the simulation has created.
     """
     ledger = run.energy
-    works = [ledger[name] for name in ("hand_work", "device_hand_work") if name in ledger]  # at the end of each step
-    kinetic = sum((ledger[name] for name in ("kinetic", "device_kinetic") if name in ledger), np.zeros(run.steps + 1))
+    works = [
+        ledger[name] for name in ("hand_work", "device_hand_work") if name in ledger
+    ]  # at the end of each step
+    kinetic = sum(
+        (ledger[name] for name in ("kinetic", "device_kinetic") if name in ledger),
+        np.zeros(run.steps + 1),
+    )
     given = sum((np.concatenate([[0.0], work]) for work in works), np.zeros(run.steps + 1))
     gain = kinetic - kinetic[0] + ledger["potential"] - ledger["potential"][0] - given
     dropped = float(ledger["potential"][0] - ledger["potential"].min())
@@ -200,6 +254,7 @@ def largest_gain(run: Run) -> float:
 
 
 def smallest_fault(turns: Callable[[float], bool]) -> float:
-    """Return the smallest relative fault that changes a verdict with either sign; it tries three faults per decade."""
+    """Return the smallest relative fault that changes a verdict with either sign; it tries three
+    faults per decade."""
     sizes = 10.0 ** (np.arange(-54, 1) / 3.0)
     return next((float(f) for f in sizes if turns(float(f)) and turns(-float(f))), float("inf"))

@@ -1,10 +1,12 @@
-"""Exact outcomes in rational arithmetic: Poisson's law at a few contacts, Newton's law with friction at one contact.
+"""Exact outcomes in rational arithmetic: Poisson's law at a few contacts, Newton's law with
+friction at one contact.
 
-Poisson's law: both LCPs are solved by trying every set of pushing contacts. Friction: a tangential impulse α p_t is
-added to Newton's normal impact; it changes no normal velocity. p_t sticks, or has size μ p_n against the slip after the
-impact. α is the largest factor in [0, 1] without a gain of energy. It is rational except for one square root, which
-ball arithmetic encloses. Sources: Kane and Levinson (1985) for the gain of energy; the module
-`iapb.contact.kernels.impact_friction` for the split of the impulse.
+Poisson's law: both LCPs are solved by trying every set of pushing contacts. Friction: a tangential
+impulse α p_t is added to Newton's normal impact; it changes no normal velocity. p_t sticks, or has
+size μ p_n against the slip after the impact. α is the largest factor in [0, 1] without a gain of
+energy. It is rational except for one square root, which ball arithmetic encloses. Sources: Kane and
+Levinson (1985) for the gain of energy; the module `iapb.contact.kernels.impact_friction` for the
+split of the impulse.
 """
 
 from __future__ import annotations
@@ -26,14 +28,23 @@ def exact_poisson(
 ) -> tuple[tuple[Fraction, ...], int]:
     """Return v⁺ exactly and the number of contacts that push.
 
-    The two LCPs are compression, `0 ≤ p_c ⟂ γ_c ≥ 0`, and restitution, `0 ≤ p_e − E p_c ⟂ γ⁺ ≥ 0` (docs/theory.md).
+    The two LCPs are compression, `0 ≤ p_c ⟂ γ_c ≥ 0`, and restitution, `0 ≤ p_e − E p_c ⟂ γ⁺ ≥ 0`
+    (docs/theory.md).
     """
-    M, J = rational_matrix("mass_matrix", mass_matrix), rational_matrix("contact_jacobian", contact_jacobian)
-    v, e = rational_matrix("velocity", velocity), rational_matrix("restitution", restitution).entries()
+    M, J = (
+        rational_matrix("mass_matrix", mass_matrix),
+        rational_matrix("contact_jacobian", contact_jacobian),
+    )
+    v, e = (
+        rational_matrix("velocity", velocity),
+        rational_matrix("restitution", restitution).entries(),
+    )
     columns = M.solve(J.transpose())  # M⁻¹Jᵀ, one column per contact
     W, gamma = J * columns, J * v
     compression = _lcp(W, gamma)
-    returned = _column(J, [p + share * p for p, share in zip(compression.entries(), e, strict=True)])
+    returned = _column(
+        J, [p + share * p for p, share in zip(compression.entries(), e, strict=True)]
+    )
     impulse = returned + _lcp(W, gamma + W * returned)
     return fractions_of(v + columns * impulse), sum(p > 0 for p in impulse.entries())
 
@@ -43,7 +54,8 @@ def _column(like: Rational, entries: list[Any]) -> Rational:
 
 
 def _lcp(W: Rational, q: Rational) -> Rational:
-    """Solve 0 ≤ p ⟂ W p + q ≥ 0 by enumeration; for a Delassus matrix W some set of independent contacts solves it."""
+    """Solve 0 ≤ p ⟂ W p + q ≥ 0 by enumeration; for a Delassus matrix W some set of independent
+    contacts solves it."""
     n, make = q.nrows(), type(W)
     for chosen in (chosen for size in range(n + 1) for chosen in combinations(range(n), size)):
         p, size = [0 * q[0, 0]] * n, len(chosen)
@@ -57,17 +69,28 @@ def _lcp(W: Rational, q: Rational) -> Rational:
                 p[i] = value
         if min(p) >= 0 and min((W * _column(W, p) + q).entries()) >= 0:
             return _column(W, p)
-    raise SolverError("the complementarity problem has no solution among sets of independent contacts")
+    raise SolverError(
+        "the complementarity problem has no solution among sets of independent contacts"
+    )
 
 
 class FrictionalImpact:
-    """v⁺ = v + (normal part) + α p_t b, where b is the change of velocity by a unit of tangential impulse."""
+    """v⁺ = v + (normal part) + α p_t b, where b is the change of velocity by a unit of tangential
+    impulse."""
 
     def __init__(
-        self, mass_matrix: ArrayLike, normal: ArrayLike, tangent: ArrayLike, velocity: ArrayLike,
-        restitution: float, friction: float,
-    ) -> None:  # fmt: skip
-        self.mass, self.v = rational_matrix("mass_matrix", mass_matrix), rational_matrix("velocity", velocity)
+        self,
+        mass_matrix: ArrayLike,
+        normal: ArrayLike,
+        tangent: ArrayLike,
+        velocity: ArrayLike,
+        restitution: float,
+        friction: float,
+    ) -> None:
+        self.mass, self.v = (
+            rational_matrix("mass_matrix", mass_matrix),
+            rational_matrix("velocity", velocity),
+        )
         n, t = rational_matrix("normal", normal), rational_matrix("tangent", tangent)
         self.e, mu = rational_matrix("coefficients", [restitution, friction]).entries()
         to_n, to_t = self.mass.solve(n.transpose()), self.mass.solve(t.transpose())
@@ -95,7 +118,8 @@ class FrictionalImpact:
 
 
 def _coulomb(slip: Any, inertia: Any, p_n: Any, across: Any, mu: Any) -> Any:
-    """Return p_t: the sticking impulse if it lies in the friction cone, else μ p_n against the remaining slip."""
+    """Return p_t: the sticking impulse if it lies in the friction cone, else μ p_n against the
+    remaining slip."""
     stick = -slip / inertia
     if abs(stick) <= mu * (p_n - across * stick):
         return stick
@@ -103,11 +127,14 @@ def _coulomb(slip: Any, inertia: Any, p_n: Any, across: Any, mu: Any) -> Any:
         p_t = -sign * mu * p_n / (1 - sign * mu * across)
         if (slip + inertia * p_t) * sign > 0 and p_n - across * p_t > 0:
             return p_t
-    raise ArithmeticError("the contact neither sticks nor slips: this exact law has no solution here")
+    raise ArithmeticError(
+        "the contact neither sticks nor slips: this exact law has no solution here"
+    )
 
 
 def _certified_root(square: Any) -> Any:
-    """Return the square root of a rational number as the midpoint of a ball with a certified radius."""
+    """Return the square root of a rational number as the midpoint of a ball with a certified
+    radius."""
     import flint
 
     before = flint.ctx.prec
@@ -115,7 +142,9 @@ def _certified_root(square: Any) -> Any:
         flint.ctx.prec = _ROOT_BITS
         ball: Any = flint.arb(square).sqrt()
         if not ball.rel_accuracy_bits() > _ROOT_BITS - 20:
-            raise ArithmeticError(f"the interval of the square root is too wide at {_ROOT_BITS} bits")
+            raise ArithmeticError(
+                f"the interval of the square root is too wide at {_ROOT_BITS} bits"
+            )
         mantissa, exponent = ball.mid().man_exp()
     finally:
         flint.ctx.prec = before

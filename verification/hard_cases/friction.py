@@ -1,8 +1,10 @@
-"""Hard cases of dry friction: Kane and Levinson's double pendulum, the sliding threshold, Painlevé's rod, stick-slip.
+"""Hard cases of dry friction: Kane and Levinson's double pendulum, the sliding threshold,
+Painlevé's rod, stick-slip.
 
-Kane and Levinson: the tip of a double pendulum strikes a rough floor, and Newton's law with friction creates energy.
-Two uniform rods of 1 m and 1 kg hang from a hinge at 22.6° and 28.1° from the vertical. The source has 20° and 30°; the
-angles here are those of the triangles 5-12-13 and 8-15-17, so that every sine and cosine is a fraction.
+Kane and Levinson: the tip of a double pendulum strikes a rough floor, and Newton's law with
+friction creates energy. Two uniform rods of 1 m and 1 kg hang from a hinge at 22.6° and 28.1° from
+the vertical. The source has 20° and 30°; the angles here are those of the triangles 5-12-13 and
+8-15-17, so that every sine and cosine is a fraction.
 """
 
 from __future__ import annotations
@@ -31,38 +33,63 @@ _G = 9.81
 _IMPLICIT = {"forces": "implicit"}
 _WORLDS = ("IAPB", "PB", COULOMB)
 
-# --- Kane and Levinson's double pendulum -----------------------------------------------------------------------
+# --- Kane and Levinson's double pendulum
+# -----------------------------------------------------------------------
 _SOURCE = "Kane and Levinson, Dynamics: Theory and Applications (1985); Kane (1984); angles and speeds ours"
 _FLOOR = -(12 / 13 + 15 / 17) - 1e-3  # [m] height of the floor: a millimetre below the tip
 _ROD_BODY = {"joint": "revolute", "mass": 1.0, "center_of_mass": [0.5, 0.0], "inertia": 1.0 / 12.0}
 _PENDULUM = [
     {"name": "upper", **_ROD_BODY, "position": [math.atan2(5, 12) - math.pi / 2]},
-    {"name": "lower", "parent": "upper", **_ROD_BODY, "origin": [1.0, 0.0], "velocity": [-0.1],
-     "shapes": [{"kind": "circle", "radius": 1e-6, "center": [1.0, 0.0]}],
-     "position": [math.atan2(8, 15) - math.atan2(5, 12)]},
-]  # fmt: skip
-_ON_TIP = _IMPLICIT | {"restitution": 0.5, "friction": 0.5, "stiffness": 1e4, "damping": 100.0,
-           "coherence_distance": 1e-2}  # fmt: skip
+    {
+        "name": "lower",
+        "parent": "upper",
+        **_ROD_BODY,
+        "origin": [1.0, 0.0],
+        "velocity": [-0.1],
+        "shapes": [{"kind": "circle", "radius": 1e-6, "center": [1.0, 0.0]}],
+        "position": [math.atan2(8, 15) - math.atan2(5, 12)],
+    },
+]
+_ON_TIP = _IMPLICIT | {
+    "restitution": 0.5,
+    "friction": 0.5,
+    "stiffness": 1e4,
+    "damping": 100.0,
+    "coherence_distance": 1e-2,
+}
 
 
 def double_pendulum_motion() -> TrajectoryCase:
     """The double pendulum falls on the floor from 1 mm and bounces for half a second."""
     return TrajectoryCase(
-        "Kane and Levinson's double pendulum, its motion", _SOURCE,
+        "Kane and Levinson's double pendulum, its motion",
+        _SOURCE,
         "a bounce with friction may throw the tip higher than the height from which it fell",
         "the energy never exceeds its initial value; Newton's and Coulomb's laws alone do not guarantee this",
-        "kinetic plus potential energy never exceeds its initial value; until the tip touches, the motion follows "
+        "kinetic plus potential energy never exceeds its initial value; until the tip touches, "
+        "the motion follows "
         "from the equations of two rods, integrated to twelve digits",
-        on_floor("kane_levinson", "Kane and Levinson's double pendulum on a rough floor", _PENDULUM, _ON_TIP,
-                 source=_SOURCE, rate=2000, duration=0.5, level=_FLOOR),
-        _measure_pendulum, worlds=("IAPB", "PB", "ideal", COULOMB),
-    )  # fmt: skip
+        on_floor(
+            "kane_levinson",
+            "Kane and Levinson's double pendulum on a rough floor",
+            _PENDULUM,
+            _ON_TIP,
+            source=_SOURCE,
+            rate=2000,
+            duration=0.5,
+            level=_FLOOR,
+        ),
+        _measure_pendulum,
+        worlds=("IAPB", "PB", "ideal", COULOMB),
+    )
 
 
 def _measure_pendulum(run: Run) -> Measured:
-    """Measure the relative error of the angles at the last instant before the tip touches the floor.
+    """Measure the relative error of the angles at the last instant before the tip touches the
+    floor.
 
-    Semi-implicit Euler is ahead by half a step's acceleration, so the relative error is at most step / time of flight.
+    Semi-implicit Euler is ahead by half a step's acceleration, so the relative error is at most
+    step / time of flight.
     """
     time, angles = _flight()
     last = int(time / run.dt) - 1
@@ -75,7 +102,8 @@ def _measure_pendulum(run: Run) -> Measured:
 
 @cache
 def _flight() -> tuple[float, Callable[[float], NDArray[np.float64]]]:
-    """Return the time at which the tip touches the floor [s], and the two angles to the horizontal until then."""
+    """Return the time at which the tip touches the floor [s], and the two angles to the horizontal
+    until then."""
     start = np.array([math.atan2(5, 12) - math.pi / 2, math.atan2(8, 15) - math.pi / 2, 0.0, -0.1])
 
     def rate(_: float, state: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -91,20 +119,26 @@ def _flight() -> tuple[float, Callable[[float], NDArray[np.float64]]]:
     return end, lambda time: np.asarray(motion(time)[:2])
 
 
-def _until(event: Any, rate: Any, start: Any, rtol: float, atol: float) -> tuple[float, Callable[[Any], Any]]:
+def _until(
+    event: Any, rate: Any, start: Any, rtol: float, atol: float
+) -> tuple[float, Callable[[Any], Any]]:
     """Return the time of the event [s] and the motion until then."""
     from scipy.integrate import solve_ivp
 
     event.terminal = True
-    found = solve_ivp(rate, (0.0, 0.1), start, "DOP853", events=event, dense_output=True, rtol=rtol, atol=atol)
+    found = solve_ivp(
+        rate, (0.0, 0.1), start, "DOP853", events=event, dense_output=True, rtol=rtol, atol=atol
+    )
     return float(found.t_events[0][0]), found.sol
 
 
-# --- a block pushed along the floor ---------------------------------------------------------------------------
+# --- a block pushed along the floor
+# ---------------------------------------------------------------------------
 _MU, _DURATION, _CREEP = 0.3, 0.2, 1e-3  # friction, [s], v_threshold of (6) [m/s]
 # Rounding over 800 steps and the settling of the springs: a correct world has no larger error.
 _KEPT = 1e-6
-# First-order error of a rigid step with Coulomb's law: half a step of the duration changes the distance by 6e-4.
+# First-order error of a rigid step with Coulomb's law: half a step of the duration changes the
+# distance by 6e-4.
 _FIRST_ORDER = 0.01
 
 
@@ -120,29 +154,59 @@ def creep_of_the_regularised_law() -> TrajectoryCase:
         return Measured(largest_gain(run), NO_GAIN, abs(float(run.q[-1, 0]) / x - 1.0), _KEPT)
 
     return TrajectoryCase(
-        "Creep of the regularised law, 1 % below the threshold", "(6) of the paper",
+        "Creep of the regularised law, 1 % below the threshold",
+        "(6) of the paper",
         "the paper's law (6) never sticks: the block must creep at the speed that the law gives, no faster",
         "after a few steps the block creeps at 0.99 times 1 mm/s, the speed below which (6) is viscous",
-        "equation (6) of the paper for one coordinate, step by step", _block(0.99, "paper"), measure,
+        "equation (6) of the paper for one coordinate, step by step",
+        _block(0.99, "paper"),
+        measure,
         ("IAPB", "PB"),
-    )  # fmt: skip
+    )
 
 
 def _block(share: float, forces: str = "implicit") -> Scene:
-    depth = _G / (2.0 * 1e4)  # static overlap of the block on two springs; friction acts at half of it
-    block = {"name": "block", "joint": "planar", "mass": 1.0, "inertia": 0.0020833333333333333,
-             "shapes": [{"kind": "box", "size": [0.15, 0.05]}], "position": [0.0, 0.025 - depth, 0.0]}
-    hand = {"body": "block", "point": [0.0, -(0.025 - 0.5 * depth)], "force": [share * _MU * _G, 0.0, 0.0]}
-    contact = {"forces": forces, "stiffness": 1e4, "damping": 100.0, "friction": _MU, "friction_velocity": _CREEP,
-               "coherence_distance": 2e-3}
-    return on_floor("pushed_block", "A block pushed along the floor", [block], contact, rate=4000, duration=_DURATION,
-                    hand=hand)  # fmt: skip
+    depth = _G / (
+        2.0 * 1e4
+    )  # static overlap of the block on two springs; friction acts at half of it
+    block = {
+        "name": "block",
+        "joint": "planar",
+        "mass": 1.0,
+        "inertia": 0.0020833333333333333,
+        "shapes": [{"kind": "box", "size": [0.15, 0.05]}],
+        "position": [0.0, 0.025 - depth, 0.0],
+    }
+    hand = {
+        "body": "block",
+        "point": [0.0, -(0.025 - 0.5 * depth)],
+        "force": [share * _MU * _G, 0.0, 0.0],
+    }
+    contact = {
+        "forces": forces,
+        "stiffness": 1e4,
+        "damping": 100.0,
+        "friction": _MU,
+        "friction_velocity": _CREEP,
+        "coherence_distance": 2e-3,
+    }
+    return on_floor(
+        "pushed_block",
+        "A block pushed along the floor",
+        [block],
+        contact,
+        rate=4000,
+        duration=_DURATION,
+        hand=hand,
+    )
 
 
 def pushed(share: float, name: str, expected: str) -> TrajectoryCase:
     """A block on the floor, pushed with this share of μ m g."""
     slide = 0.5 * max(share - 1.0, 0.0) * _MU * _G * _DURATION**2
-    scale = slide or _CREEP * _DURATION  # if the block sticks: the distance of a creep at v_threshold
+    scale = (
+        slide or _CREEP * _DURATION
+    )  # if the block sticks: the distance of a creep at v_threshold
 
     def measure(run: Run) -> Measured:
         """Measure the distance from the motion of Coulomb's law, relative to `scale`."""
@@ -150,42 +214,75 @@ def pushed(share: float, name: str, expected: str) -> TrajectoryCase:
         return Measured(largest_gain(run), NO_GAIN, off, _FIRST_ORDER)
 
     return TrajectoryCase(
-        name, "Coulomb's law",
-        "a change of the force by one per cent decides whether the block moves", expected,
+        name,
+        "Coulomb's law",
+        "a change of the force by one per cent decides whether the block moves",
+        expected,
         f"Coulomb's law in closed form: {slide * 1e3:.4g} mm after {_DURATION:g} s",
-        _block(share), measure, _WORLDS,
-    )  # fmt: skip
+        _block(share),
+        measure,
+        _WORLDS,
+    )
 
 
-# --- Painlevé's rod -------------------------------------------------------------------------------------------
+# --- Painlevé's rod
+# -------------------------------------------------------------------------------------------
 _SINE, _COSINE, _ROUGH, _SPEED, _STIFF = 0.8, 0.6, 2.0, 1.0, 1e4
-_HEIGHT = 0.5 * _SINE + 1e-6 - 1e-9  # of the centre [m]: an overlap of 1 nm, so that the contact is closed at the start
-_MOBILITY = 1.0 + 3.0 * _COSINE * (_COSINE - _ROUGH * _SINE)  # [1/kg] of the sliding contact: negative
+_HEIGHT = (
+    0.5 * _SINE + 1e-6 - 1e-9
+)  # of the centre [m]: an overlap of 1 nm, so that the contact is closed at the start
+_MOBILITY = 1.0 + 3.0 * _COSINE * (
+    _COSINE - _ROUGH * _SINE
+)  # [1/kg] of the sliding contact: negative
 _GROWTH = math.sqrt(-_MOBILITY * _STIFF)  # [1/s] σ: the overlap grows as exp(σ t) at first
 
-_ROD = {"name": "rod", "joint": "planar", "mass": 1.0, "inertia": 1.0 / 12.0, "velocity": [-_SPEED, 0.0, 0.0],
-        "shapes": [{"kind": "circle", "radius": 1e-6, "center": [-0.5, 0.0]}],
-        "position": [0.0, _HEIGHT, math.atan2(_SINE, _COSINE)]}  # fmt: skip
-_ON_END = _IMPLICIT | {"stiffness": _STIFF, "damping": 0.0, "friction": _ROUGH, "coherence_distance": 5e-3}
+_ROD = {
+    "name": "rod",
+    "joint": "planar",
+    "mass": 1.0,
+    "inertia": 1.0 / 12.0,
+    "velocity": [-_SPEED, 0.0, 0.0],
+    "shapes": [{"kind": "circle", "radius": 1e-6, "center": [-0.5, 0.0]}],
+    "position": [0.0, _HEIGHT, math.atan2(_SINE, _COSINE)],
+}
+_ON_END = _IMPLICIT | {
+    "stiffness": _STIFF,
+    "damping": 0.0,
+    "friction": _ROUGH,
+    "coherence_distance": 5e-3,
+}
 
 
 def painleve_rod() -> TrajectoryCase:
-    """A rod slides on its lower end with μ = 2: its effective inertia is negative, so no finite force exists."""
+    """A rod slides on its lower end with μ = 2: its effective inertia is negative, so no finite
+    force exists."""
     return TrajectoryCase(
         "Painlevé's rod: sliding without a finite answer",
         "Painlevé (1895); Génot and Brogliato (1999); Stewart (2000)",
-        "the effective inertia of the sliding contact is negative: no acceleration of rigid bodies satisfies the laws, "
+        "the effective inertia of the sliding contact is negative: no acceleration of rigid "
+        "bodies satisfies the laws, "
         "and with springs the force grows without bound",
         "the rod jams: with a rigid contact at once, with a spring as soon as the force is large enough",
         f"the equations of motion: with springs the slip stops after {1e3 * _slipping()[0]:.1f} ms; if rigid, at once",
-        on_floor("painleve_rod", "Painlevé's rod", [_ROD], _ON_END, source="Painlevé (1895)", rate=8000, duration=0.1),
-        _measure_rod, _WORLDS,
-    )  # fmt: skip
+        on_floor(
+            "painleve_rod",
+            "Painlevé's rod",
+            [_ROD],
+            _ON_END,
+            source="Painlevé (1895)",
+            rate=8000,
+            duration=0.1,
+        ),
+        _measure_rod,
+        _WORLDS,
+    )
 
 
 @cache
 def _slipping() -> tuple[float, Callable[[NDArray[np.float64]], NDArray[np.float64]]]:
-    """Return the time at which the slip stops [s] and its speed until then [m/s], for a rod on one spring."""
+    """Return the time at which the slip stops [s] and its speed until then [m/s], for a rod on one
+    spring."""
+
     def slip(state: NDArray[np.float64]) -> Any:
         return state[3] + 0.5 * np.sin(state[2]) * state[5]
 
@@ -204,55 +301,84 @@ def _slipping() -> tuple[float, Callable[[NDArray[np.float64]], NDArray[np.float
 
 
 def _measure_rod(run: Run) -> Measured:
-    """Measure the largest error of the slip speed until it stops, relative to the initial slip speed.
+    """Measure the largest error of the slip speed until it stops, relative to the initial slip
+    speed.
 
-    A rigid world must have no slip after the first step, except for the rotation of the rod within a step. With springs
-    a first-order method may start or stop the slip one step late or early. Implicit contact is also early because its
-    force acts at the end of the step, as if the spring had a damper KΔt: the overlap then grows at the rate
-    σ + ½ σ² Δt instead of σ, so after the time t it is ahead by ½ σ t steps. The bound is the largest change of the
-    slip speed in one step, times these steps.
+    A rigid world must have no slip after the first step, except for the rotation of the rod within
+    a step. With springs a first-order method may start or stop the slip one step late or early.
+    Implicit contact is also early because its force acts at the end of the step, as if the spring
+    had a damper KΔt: the overlap then grows at the rate σ + ½ σ² Δt instead of σ, so after the time
+    t it is ahead by ½ σ t steps. The bound is the largest change of the slip speed in one step,
+    times these steps.
     """
     slip = run.v[:, 0] + 0.5 * np.sin(run.q[:, 2]) * run.v[:, 2]
     end, truth = _slipping()
     if run.law == "rigid constraints":
-        return Measured(largest_gain(run), NO_GAIN, float(np.abs(slip[1:]).max()) / _SPEED, _FIRST_ORDER)
+        return Measured(
+            largest_gain(run), NO_GAIN, float(np.abs(slip[1:]).max()) / _SPEED, _FIRST_ORDER
+        )
     slipping = run.time < end
     true = truth(run.time[slipping])
     steepest = float(np.abs(np.diff(true)).max())
     early = (1.0 + 0.5 * _GROWTH * end) * steepest
-    return Measured(largest_gain(run), NO_GAIN, float(np.abs(slip[slipping] - true).max()) / _SPEED, early / _SPEED)
+    return Measured(
+        largest_gain(run),
+        NO_GAIN,
+        float(np.abs(slip[slipping] - true).max()) / _SPEED,
+        early / _SPEED,
+    )
 
 
-# --- a plate pushed by a spring: stick-slip -----------------------------------------------------------------------
-# The spring is a contact: a ball of 1e8 kg with constant speed presses on the edge of a plate of 1 kg.
+# --- a plate pushed by a spring: stick-slip
+# ----------------------------------------------------------------------- The spring is a contact: a
+# ball of 1e8 kg with constant speed presses on the edge of a plate of 1 kg.
 _PRESS, _PRESSED = 1e4, 0.5  # spring [N/m], duration [s]
 _DAMPED = 10.0  # damper of the contact [N s/m]
 _STEADY = 0.01  # speed of the ball [m/s]
 _OMEGA = math.sqrt(_PRESS)  # [rad/s] of the plate on the spring, without the damper
 _DECAY = 0.5 * _DAMPED  # [1/s] of its swing
 _SWING = math.sqrt(_OMEGA**2 - _DECAY**2)  # [rad/s] with the damper
-_SLIDING = _MU * _G / _PRESS  # the spring's depth [m] in steady sliding; the start has 1.5 times this depth
+_SLIDING = (
+    _MU * _G / _PRESS
+)  # the spring's depth [m] in steady sliding; the start has 1.5 times this depth
 _THICK, _THIN = 2e-3, 4e-4  # the plate's height and the ball's radius [m]
-# Error of a step Δt in units of ωΔt times the swing V/ω. The force acts at the end of the step, as if the contact had
-# another damper KΔt, so the swing decays faster by ω²Δt/2. It loses ½ω²Δt t exp(−at) of its size, at most
-# ω²Δt/(2 e a), with a the decay rate and e Euler's number. The stick begins and ends up to one step late.
+# Error of a step Δt in units of ωΔt times the swing V/ω. The force acts at the end of the step, as
+# if the contact had another damper KΔt, so the swing decays faster by ω²Δt/2. It loses ½ω²Δt t
+# exp(−at) of its size, at most ω²Δt/(2 e a), with a the decay rate and e Euler's number. The stick
+# begins and ends up to one step late.
 _LATE = _OMEGA / (2.0 * math.e * _DECAY) + 2.0
 
 
 def stick_slip() -> TrajectoryCase:
-    """A plate of 1 kg on a rough floor, pushed by a spring and damper whose other end moves at constant speed."""
+    """A plate of 1 kg on a rough floor, pushed by a spring and damper whose other end moves at
+    constant speed."""
     swing, depth = _STEADY / _OMEGA, 1.5 * _SLIDING
     height = 0.5 * _THICK - _G / (2.0 * _PRESS)
-    plate = {"name": "plate", "joint": "planar", "mass": 1.0, "inertia": 0.001875, "velocity": [_STEADY, 0.0, 0.0],
-             "shapes": [{"kind": "box", "size": [0.15, _THICK]}], "position": [0.0, height, 0.0]}
-    presses = ball("ball", _THIN, 0.0, origin=[-0.075 - _THIN + depth, height], mass=1e8, velocity=[_STEADY])
-    contact = _IMPLICIT | {"stiffness": _PRESS, "damping": _DAMPED, "friction": _MU, "coherence_distance": 2e-3}
+    plate = {
+        "name": "plate",
+        "joint": "planar",
+        "mass": 1.0,
+        "inertia": 0.001875,
+        "velocity": [_STEADY, 0.0, 0.0],
+        "shapes": [{"kind": "box", "size": [0.15, _THICK]}],
+        "position": [0.0, height, 0.0],
+    }
+    presses = ball(
+        "ball", _THIN, 0.0, origin=[-0.075 - _THIN + depth, height], mass=1e8, velocity=[_STEADY]
+    )
+    contact = _IMPLICIT | {
+        "stiffness": _PRESS,
+        "damping": _DAMPED,
+        "friction": _MU,
+        "coherence_distance": 2e-3,
+    }
 
     def measure(run: Run) -> Measured:
-        """Measure the largest distance from the closed form, relative to the swing V/ω, and the energy gain.
+        """Measure the largest distance from the closed form, relative to the swing V/ω, and the
+        energy gain.
 
-        The energy is measured in the frame of the ball, (v − V)² / 2 + K u² / 2. The damper takes some of it while the
-        plate slides, friction while it sticks.
+        The energy is measured in the frame of the ball, (v − V)² / 2 + K u² / 2. The damper takes
+        some of it while the plate slides, friction while it sticks.
         """
         u = _STEADY * run.time - run.q[:, 0] + 0.5 * _SLIDING
         held = (run.v[:, 0] - _STEADY) ** 2 + _PRESS * u**2
@@ -265,16 +391,25 @@ def stick_slip() -> TrajectoryCase:
         "the plate stops and starts again where the forces on it are exactly at the limit of friction, μ m g",
         "the plate slides, sticks once, and slides on; its swing on the spring decays, so it never sticks again",
         "closed form: a damped swing while the plate slides, at rest while spring and damper press less than μ m g",
-        on_floor("stick_slip", "A plate pushed by a spring", [plate, presses], contact, rate=4000, duration=_PRESSED),
-        measure, ("IAPB", "PB"),
-    )  # fmt: skip
+        on_floor(
+            "stick_slip",
+            "A plate pushed by a spring",
+            [plate, presses],
+            contact,
+            rate=4000,
+            duration=_PRESSED,
+        ),
+        measure,
+        ("IAPB", "PB"),
+    )
 
 
 def pushed_plate(time: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the position of the plate [m]; u is the spring's depth minus that of steady sliding.
 
-    While the plate slides, u'' = −ω² u − 2 a u'. It starts with u₀ at the ball's speed V, and stops where u' = V. It
-    slides again where spring and damper press with the limit of friction, ω² u + 2 a V = 0.
+    While the plate slides, u'' = −ω² u − 2 a u'. It starts with u₀ at the ball's speed V, and stops
+    where u' = V. It slides again where spring and damper press with the limit of friction, ω² u + 2
+    a V = 0.
     """
     u0 = 0.5 * _SLIDING
     stops = _stopping(u0)
@@ -285,11 +420,15 @@ def pushed_plate(time: NDArray[np.float64]) -> NDArray[np.float64]:
     held = u0 + _STEADY * stops - stopped_at
     again = _swing(time - starts, starts_at, _STEADY + _DECAY * starts_at)
     last = held + _STEADY * (time - starts) + starts_at - again
-    return np.asarray(np.select([time < stops, time < starts], [first, np.full_like(time, held)], last), np.float64)
+    return np.asarray(
+        np.select([time < stops, time < starts], [first, np.full_like(time, held)], last),
+        np.float64,
+    )
 
 
 def _swing(time: NDArray[np.float64], place: float, push: float) -> NDArray[np.float64]:
-    """Return u(t) = exp(−a t) (u(0) cos Ωt + (u'(0) + a u(0)) sin(Ωt) / Ω) [m]; `push` is u'(0) + a u(0) [m/s]."""
+    """Return u(t) = exp(−a t) (u(0) cos Ωt + (u'(0) + a u(0)) sin(Ωt) / Ω) [m]; `push` is u'(0) + a
+    u(0) [m/s]."""
     swung = place * np.cos(_SWING * time) + push / _SWING * np.sin(_SWING * time)
     return np.asarray(np.exp(-_DECAY * time) * swung, np.float64)
 
@@ -300,6 +439,8 @@ def _stopping(u0: float) -> float:
     from scipy.optimize import brentq
 
     def too_slow(time: float) -> float:
-        return -math.exp(-_DECAY * time) * _OMEGA**2 * u0 / _SWING * math.sin(_SWING * time) - _STEADY
+        return (
+            -math.exp(-_DECAY * time) * _OMEGA**2 * u0 / _SWING * math.sin(_SWING * time) - _STEADY
+        )
 
     return float(brentq(too_slow, math.pi / _SWING, 1.5 * math.pi / _SWING, xtol=1e-15))

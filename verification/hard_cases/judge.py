@@ -1,10 +1,13 @@
-"""Judge methods and worlds on hard cases; each pair of case and method gets one verdict with its numbers.
+"""Judge methods and worlds on hard cases; each pair of case and method gets one verdict with its
+numbers.
 
-An impact method is judged by its energy gain, restitution residual and distance from the exact outcome. A world must
-create no energy, and its error may not exceed the error that its time step may cause.
+An impact method is judged by its energy gain, restitution residual and distance from the exact
+outcome. A world must create no energy, and its error may not exceed the error that its time step
+may cause.
 
-A method that forms the Delassus matrix of thousands of contacts takes minutes and gigabytes, and Python cannot
-interrupt a C routine. Such a method is not tried on more than MOST_CONTACTS contacts, and its row says so.
+A method that forms the Delassus matrix of thousands of contacts takes minutes and gigabytes, and
+Python cannot interrupt a C routine. Such a method is not tried on more than MOST_CONTACTS contacts,
+and its row says so.
 """
 
 from __future__ import annotations
@@ -52,19 +55,26 @@ Simulate = Callable[[Scene, str], Run]
 _STILL = 1e-9  # [m, rad] largest displacement by rounding and by settling springs
 WITHOUT_CLAMP = "factored, no clamp"
 METHODS = ("factored", WITHOUT_CLAMP, *COMPARED)
-# Factor of n ε √κ (√κ + κ(A)), n = max(c, d). The backward error of Cholesky's factor, the two solves with this factor
-# (Higham 2002, theorems 10.3 and 8.5) and the basis of the rows each contribute a few n ε; 1 + e = 2 doubles them. κ is
-# that of M scaled to a unit diagonal, because rounding acts on each component by itself (van der Sluis 1969).
+# Factor of n ε √κ (√κ + κ(A)), n = max(c, d). The backward error of Cholesky's factor, the two
+# solves with this factor (Higham 2002, theorems 10.3 and 8.5) and the basis of the rows each
+# contribute a few n ε; 1 + e = 2 doubles them. κ is that of M scaled to a unit diagonal, because
+# rounding acts on each component by itself (van der Sluis 1969).
 _MARGIN = 10.0
-_REPEATS = 5  # number of timed calls after the first one, which fills caches; their median is reported
+_REPEATS = (
+    5  # number of timed calls after the first one, which fills caches; their median is reported
+)
 _SLOW = 0.2  # [s] a slower call is not repeated
-_HALF_SUBNORMAL = Fraction(1, 2**1075)  # rounding error of subnormal numbers, which no relative bound covers
+_HALF_SUBNORMAL = Fraction(
+    1, 2**1075
+)  # rounding error of subnormal numbers, which no relative bound covers
 _FORM_DELASSUS = ("gram_pinv", "gram_cholesky", "damped")
-# The residuals of these methods depend on the LAPACK: 7e-9 to 5e-8 on Kahan's rows, with a tolerance of 1e-8.
+# The residuals of these methods depend on the LAPACK: 7e-9 to 5e-8 on Kahan's rows, with a
+# tolerance of 1e-8.
 _THROUGH_LAPACK = ("gram_pinv", "gram_cholesky", "damped", "svd")
 _NOISE = 10.0  # a residual within this factor of the tolerance decides nothing
-# An error of more than half of |v⁻| is entirely noise, and the sign of the energy gain is then random (relative gains
-# of −1e-3 to 1e-4, depending on the BLAS, for the printed formula on rows 1e-4 apart).
+# An error of more than half of |v⁻| is entirely noise, and the sign of the energy gain is then
+# random (relative gains of −1e-3 to 1e-4, depending on the BLAS, for the printed formula on rows
+# 1e-4 apart).
 _ALL_NOISE = 0.5
 MOST_CONTACTS = 2000  # on which these methods are tried: the SVD of W takes a second
 
@@ -83,26 +93,35 @@ def methods_for(case: AnyCase) -> tuple[str, ...]:
     return case.worlds
 
 
-# The numbers of a verdict in a row; a number that does not apply, or is missing or not finite, is None.
+# The numbers of a verdict in a row; a number that does not apply, or is missing or not finite, is
+# None.
 _NUMBERS = (
     "energy gain",  # impacts: the exact (KE⁺ − KE⁻)/KE⁻; motions: see `largest_gain`
     "gain allowed",  # by rounding (10 d ε √κ(M)) or by the time step
-    "restitution residual",  # max |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|); Poisson's law: the largest approach left
-    "forward error",  # impacts: |v⁺ − truth| / |v⁻| in the kinetic metric; motions: relative distance from the law
+    # max |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|); Poisson's law: the largest approach left
+    "restitution residual",
+    # impacts: |v⁺ − truth| / |v⁻| in the kinetic metric; motions: relative distance from the law
+    "forward error",
     "error allowed",  # by the conditioning or the time step
-    "smallest fault seen",  # the smallest relative fault in a stable answer that changes the verdict
+    # the smallest relative fault in a stable answer that changes the verdict
+    "smallest fault seen",
 )
 
 
 def judge_hard_case(case: AnyCase, method: str, simulate: Simulate = run_in_world) -> Row:
     """Return the row of one method on one impact, or of one world on one trajectory.
 
-    The outcome is "stable", "gains energy", "restitution unmet", "wrong motion", "refused", "failed", NOT_TRIED
-    or DEPENDS_ON_ROUNDING. The last one is for methods that use LAPACK: their residual is within a factor of ten of the
-    tolerance, or their error exceeds half of |v⁻|, so another BLAS may change the outcome. The rank is the one that the
-    method used, or the largest of a run's impacts; the time is that of a call or a step.
+    The outcome is "stable", "gains energy", "restitution unmet", "wrong motion", "refused",
+    "failed", NOT_TRIED or DEPENDS_ON_ROUNDING. The last one is for methods that use LAPACK: their
+    residual is within a factor of ten of the tolerance, or their error exceeds half of |v⁻|, so
+    another BLAS may change the outcome. The rank is the one that the method used, or the largest of
+    a run's impacts; the time is that of a call or a step.
     """
-    return judge_impact(case, method) if isinstance(case, HardCase) else _judge_motion(case, method, simulate)
+    return (
+        judge_impact(case, method)
+        if isinstance(case, HardCase)
+        else _judge_motion(case, method, simulate)
+    )
 
 
 @cache
@@ -120,23 +139,43 @@ def _judge_motion(case: TrajectoryCase, world: str, simulate: Simulate) -> Row:
         return _row(world, _verdict_of(error), note=str(error))
     found, residual = case.measure(run), restitution_residual(run)
     restored = not residual > RESTITUTION_TOLERANCE  # NaN: the run has no collision to judge
-    verdict = _verdict(found.energy_gain <= found.energy_bound, restored, found.error <= found.error_bound)
+    verdict = _verdict(
+        found.energy_gain <= found.energy_bound, restored, found.error <= found.error_bound
+    )
 
     def is_seen(size: float) -> bool:  # a planted fault does not change the energies
         moved = case.measure(faulty_motion(run, size))
         return not moved.error <= moved.error_bound
 
     fault = smallest_fault(is_seen) if verdict == STABLE else math.nan
-    seconds = float(np.median(run.chunk_seconds / run.chunk_steps)) if len(run.chunk_steps) else math.nan
+    seconds = (
+        float(np.median(run.chunk_seconds / run.chunk_steps)) if len(run.chunk_steps) else math.nan
+    )
     numbers = found.energy_gain, found.energy_bound, residual, found.error, found.error_bound, fault
     return _row(world, verdict, numbers, int(run.impacts.rank.max(initial=0)), None, seconds)
 
 
-def _row(method: str, outcome: str, numbers: Sequence[float] = (math.nan,) * len(_NUMBERS), rank: int | None = None,
-         exact_rank: int | None = None, seconds: float = math.nan, note: str = "") -> Row:  # fmt: skip
-    known = {name: x if math.isfinite(x) else None for name, x in zip(_NUMBERS, numbers, strict=True)}
-    return {"method": method, "outcome": outcome, **known, "rank": rank, "exact rank": exact_rank,
-            "time [µs]": 1e6 * seconds if math.isfinite(seconds) else None, "note": note}  # fmt: skip
+def _row(
+    method: str,
+    outcome: str,
+    numbers: Sequence[float] = (math.nan,) * len(_NUMBERS),
+    rank: int | None = None,
+    exact_rank: int | None = None,
+    seconds: float = math.nan,
+    note: str = "",
+) -> Row:
+    known = {
+        name: x if math.isfinite(x) else None for name, x in zip(_NUMBERS, numbers, strict=True)
+    }
+    return {
+        "method": method,
+        "outcome": outcome,
+        **known,
+        "rank": rank,
+        "exact rank": exact_rank,
+        "time [µs]": 1e6 * seconds if math.isfinite(seconds) else None,
+        "note": note,
+    }
 
 
 def _verdict(passive: bool, restored: bool, right: bool) -> str:
@@ -152,7 +191,8 @@ def _verdict_of(error: IapbError) -> str:
 def faulty_motion(run: Run, fault: float) -> Run:
     """Return the run with all displacements and changes of velocity increased by the share `fault`.
 
-    If nothing moves in the run, all coordinates creep instead at this share of the scene's v_threshold.
+    If nothing moves in the run, all coordinates creep instead at this share of the scene's
+    v_threshold.
     """
     moved, sped = run.q - run.q[0], run.v - run.v[0]
     if np.abs(moved).max() < _STILL:
@@ -162,11 +202,13 @@ def faulty_motion(run: Run, fault: float) -> Run:
 
 
 def restitution_residual(run: Run) -> float:
-    """Return the largest |p·γ⁺ + e p·γ⁻| / p·(γ⁺ − γ⁻) of all steps with collisions; NaN if there is none to judge.
+    """Return the largest |p·γ⁺ + e p·γ⁻| / p·(γ⁺ − γ⁻) of all steps with collisions; NaN if there
+    is none to judge.
 
-    p are the normal impulses of the step's contacts, γ⁻ and γ⁺ their normal velocities before and after the impact. If
-    every contact that pushes satisfies γ⁺ = −e γ⁻, the residual is zero. For a rigid world the result is NaN, because
-    its impulses also close gaps and carry the forces of the step.
+    p are the normal impulses of the step's contacts, γ⁻ and γ⁺ their normal velocities before and
+    after the impact. If every contact that pushes satisfies γ⁺ = −e γ⁻, the residual is zero. For a
+    rigid world the result is NaN, because its impulses also close gaps and carry the forces of the
+    step.
     """
     contacts, impacts = run.contacts, run.impacts
     struck = np.flatnonzero(contacts.impulse)
@@ -190,7 +232,8 @@ def restitution_residual(run: Run) -> float:
 
 
 class Answer(NamedTuple):
-    """The judged quantities of an impact, v⁺ and rank (None: not known), and the time of the call [s]."""
+    """The judged quantities of an impact, v⁺ and rank (None: not known), and the time of the call
+    [s]."""
 
     velocity: Any
     rank: int | None
@@ -212,11 +255,17 @@ def judge_impact(case: HardCase, method: str) -> Row:
         return _row(method, _verdict_of(error), known, exact_rank=truth.rank, note=str(error))
 
     def measured(v_plus: Floats) -> tuple[str, float, float, float]:
-        """Return the verdict, the energy gain, the restitution residual and the distance from the truth."""
+        """Return the verdict, the energy gain, the restitution residual and the distance from the
+        truth."""
         gain = relative_energy_gain(case.mass_matrix, case.velocity, v_plus)
         residual, distance = _unmet(case, v_plus), _forward_error(case, v_plus)
         right = not case.well_posed or distance <= forward_bound
-        return _verdict(gain <= energy_bound, residual <= RESTITUTION_TOLERANCE, right), gain, residual, distance
+        return (
+            _verdict(gain <= energy_bound, residual <= RESTITUTION_TOLERANCE, right),
+            gain,
+            residual,
+            distance,
+        )
 
     def is_seen(wrong: Floats, size: float) -> bool:
         return measured(answer.velocity + size * wrong)[0] != STABLE
@@ -227,7 +276,10 @@ def judge_impact(case: HardCase, method: str) -> Row:
     if method in _THROUGH_LAPACK and (verdict != "gains energy" and near or noise):
         verdict = DEPENDS_ON_ROUNDING
     if verdict == STABLE:
-        fault = max(smallest_fault(partial(is_seen, wrong)) for wrong in faulty_answers(case, answer.velocity))
+        fault = max(
+            smallest_fault(partial(is_seen, wrong))
+            for wrong in faulty_answers(case, answer.velocity)
+        )
     numbers = gain, energy_bound, residual, distance, forward_bound, fault
     return _row(method, verdict, numbers, answer.rank, truth.rank, answer.seconds)
 
@@ -236,13 +288,18 @@ def allowed_error(case: HardCase) -> float:
     """Return the largest error of v⁺ by rounding, in the kinetic metric, relative to |v⁻|."""
     truth, n = case.truth, max(case.contact_jacobian.shape)
     root = float(np.sqrt(truth.scaled_condition))
-    diagonal = sum((Fraction(x) for x in np.diag(case.mass_matrix)), Fraction(0)) * _HALF_SUBNORMAL**2
-    of_subnormals = float(np.sqrt(float(len(case.velocity) * diagonal / _form(case, case.velocity))))
+    diagonal = (
+        sum((Fraction(x) for x in np.diag(case.mass_matrix)), Fraction(0)) * _HALF_SUBNORMAL**2
+    )
+    of_subnormals = float(
+        np.sqrt(float(len(case.velocity) * diagonal / _form(case, case.velocity)))
+    )
     return _MARGIN * n * EPS * root * (root + truth.row_condition) + of_subnormals
 
 
 def faulty_answers(case: HardCase, v_plus: Floats) -> list[Floats]:
-    """Return the vectors that a relative fault scales: the change of velocity, and v⁺ unless it is nearly zero."""
+    """Return the vectors that a relative fault scales: the change of velocity, and v⁺ unless it is
+    nearly zero."""
     change = v_plus - case.velocity
     stopped = _form(case, v_plus) <= _form(case, case.velocity) / 10**6
     return ([change] if change.any() else []) + ([] if stopped else [v_plus])
@@ -254,18 +311,23 @@ def _answer(case: HardCase, method: str) -> Answer:
     first = resolve_once(case, method)
     if first.seconds >= _SLOW:
         return first
-    return first._replace(seconds=statistics.median(resolve_once(case, method).seconds for _ in range(_REPEATS)))
+    return first._replace(
+        seconds=statistics.median(resolve_once(case, method).seconds for _ in range(_REPEATS))
+    )
 
 
 def resolve_once(case: HardCase, method: str) -> Answer:
-    """Resolve and time one impact; with friction by the engine's law, or by Newton's and Coulomb's laws alone."""
+    """Resolve and time one impact; with friction by the engine's law, or by Newton's and Coulomb's
+    laws alone."""
     given = case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution
     rank: int | None
     started, rank = time.perf_counter(), None
     if isinstance(case, FrictionalCase) and method == NEWTON_COULOMB:
         velocity, rank = np.array([float(x) for x in case.impact.velocity(1)]), 1
     elif isinstance(case, FrictionalCase):
-        rubbed = resolve_frictional_impact(*given[:2], case.tangent, case.velocity, float(given[3]), case.friction)
+        rubbed = resolve_frictional_impact(
+            *given[:2], case.tangent, case.velocity, float(given[3]), case.friction
+        )
         velocity, rank = rubbed.velocity, 1
     elif method in COMPARED:
         velocity = COMPARED[method](*given)
@@ -286,16 +348,21 @@ def warm_up() -> None:
 
 
 def _unmet(case: HardCase, v_plus: Floats) -> float:
-    """Return the largest relative violation of the law on the given rows; scaled speeds prevent underflow."""
+    """Return the largest relative violation of the law on the given rows; scaled speeds prevent
+    underflow."""
     unit = float(np.max(np.abs(case.velocity), initial=0.0)) or 1.0
     J, v, after = case.contact_jacobian, case.velocity / unit, v_plus / unit
     lower = np.linalg.cholesky(case.mass_matrix)
     scale = np.linalg.norm(np.linalg.solve(lower, J.T), axis=0) * np.linalg.norm(lower.T @ v)
     if np.ndim(case.restitution):
-        unmet = np.maximum(-(J @ after), 0.0)  # Poisson's law: no contact approaches after the impact
+        unmet = np.maximum(
+            -(J @ after), 0.0
+        )  # Poisson's law: no contact approaches after the impact
     else:
         unmet = np.abs(J @ after + case.restitution * (J @ v))
-    return float(np.max(np.divide(unmet, scale, out=np.zeros(len(J)), where=scale > 0.0), initial=0.0))
+    return float(
+        np.max(np.divide(unmet, scale, out=np.zeros(len(J)), where=scale > 0.0), initial=0.0)
+    )
 
 
 def _forward_error(case: HardCase, v_plus: Floats) -> float:

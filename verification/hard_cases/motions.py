@@ -1,4 +1,5 @@
-"""Motions with a law in closed form: contact chatter, a sampled wall at Colgate's bound, a wedged peg, a cradle."""
+"""Motions with a law in closed form: contact chatter, a sampled wall at Colgate's bound, a wedged
+peg, a cradle."""
 
 from __future__ import annotations
 
@@ -9,29 +10,52 @@ from numpy.typing import NDArray
 
 from iapb.run import Run
 from iapb.scene import find_scene, load_scene
-from verification.hard_cases.case import NO_GAIN, Measured, TrajectoryCase, ball, largest_gain, on_floor
+from verification.hard_cases.case import (
+    NO_GAIN,
+    Measured,
+    TrajectoryCase,
+    ball,
+    largest_gain,
+    on_floor,
+)
 
-# --- a ball that chatters --------------------------------------------------------------------------------------
+# --- a ball that chatters
+# --------------------------------------------------------------------------------------
 _HEIGHT, _GRAVITY, _RESTITUTION, _RADIUS = 0.1, 9.81, 0.5, 0.1
-# Each bounce is up to one step late: bounce k is k steps late at speed v eᵏ, in sum v Δt Σ k eᵏ = 2 v Δt for e = ½. The
-# first bounce penetrates by one step, and the height between two instants has an error of one step, too.
+# Each bounce is up to one step late: bounce k is k steps late at speed v eᵏ, in sum v Δt Σ k eᵏ = 2
+# v Δt for e = ½. The first bounce penetrates by one step, and the height between two instants has
+# an error of one step, too.
 _STEPS_LATE = 4.0
 
 _FALL = math.sqrt(2.0 * _HEIGHT / _GRAVITY)  # [s] until the first bounce
-_END_OF_BOUNCES = _FALL * (1.0 + 2.0 * _RESTITUTION / (1.0 - _RESTITUTION))  # [s], the sum of all flights
-_HARD = {"restitution": _RESTITUTION, "stiffness": 1e5, "damping": 200.0, "coherence_distance": 5e-3}
+_END_OF_BOUNCES = _FALL * (
+    1.0 + 2.0 * _RESTITUTION / (1.0 - _RESTITUTION)
+)  # [s], the sum of all flights
+_HARD = {
+    "restitution": _RESTITUTION,
+    "stiffness": 1e5,
+    "damping": 200.0,
+    "coherence_distance": 5e-3,
+}
 
 
 def chatter() -> TrajectoryCase:
     """A ball dropped from 0.1 m with e = ½."""
     return TrajectoryCase(
-        "Contact chatter: infinitely many bounces in 0.43 s", "Zeno's bouncing ball; textbook",
+        "Contact chatter: infinitely many bounces in 0.43 s",
+        "Zeno's bouncing ball; textbook",
         "the bounces accumulate at one instant: an event-driven method never passes it, time stepping may bounce on",
         "the ball follows the parabolas as far as the time step resolves them, then it rests",
         f"closed form: after bounce k a parabola of height h e²ᵏ; at rest from {_END_OF_BOUNCES:.4f} s on",
-        on_floor("chatter", "A ball that chatters to rest", [ball("ball", _RADIUS, _RADIUS + _HEIGHT, axis=[0, 1])],
-                 _HARD, duration=1.0), _measure_chatter,
-    )  # fmt: skip
+        on_floor(
+            "chatter",
+            "A ball that chatters to rest",
+            [ball("ball", _RADIUS, _RADIUS + _HEIGHT, axis=[0, 1])],
+            _HARD,
+            duration=1.0,
+        ),
+        _measure_chatter,
+    )
 
 
 def exact_height(time: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -40,8 +64,11 @@ def exact_height(time: NDArray[np.float64]) -> NDArray[np.float64]:
     start, speed = _FALL, _GRAVITY * _FALL * _RESTITUTION
     while speed * speed / (2.0 * _GRAVITY) > np.finfo(float).eps * _HEIGHT:
         flown = time - start
-        height = np.where((flown >= 0.0) & (flown < 2.0 * speed / _GRAVITY),
-                          speed * flown - 0.5 * _GRAVITY * flown**2, height)  # fmt: skip
+        height = np.where(
+            (flown >= 0.0) & (flown < 2.0 * speed / _GRAVITY),
+            speed * flown - 0.5 * _GRAVITY * flown**2,
+            height,
+        )
         start, speed = start + 2.0 * speed / _GRAVITY, speed * _RESTITUTION
     return np.asarray(height, np.float64)
 
@@ -53,38 +80,60 @@ def _measure_chatter(run: Run) -> Measured:
     return Measured(largest_gain(run), NO_GAIN, off, late)
 
 
-# --- a sampled wall: it is passive if b > K T / 2 + |B|; otherwise its spring can create energy -------------------
+# --- a sampled wall: it is passive if b > K T / 2 + |B|; otherwise its spring can create energy
+# -------------------
 _PHYSICAL_DAMPING = 0.5  # b [N s/m] of the device of scenes/wall_1d.yaml
-_MASS, _FORCE, _COUPLING, _COUPLING_DAMPING = 2.0, 0.4, 100.0, 70.0  # of tool and device, hand, coupling, in SI units
+_MASS, _FORCE, _COUPLING, _COUPLING_DAMPING = (
+    2.0,
+    0.4,
+    100.0,
+    70.0,
+)  # of tool and device, hand, coupling, in SI units
 _RADIUS_OF_HANDLE = 0.01
 _BOUND = 2.0 * _PHYSICAL_DAMPING * 512.0  # K [N/m] with B = 0
-# Rounding over 1,536 steps, which each new contact amplifies: measured 1e-9 of the distance; faults are far larger.
+# Rounding over 1,536 steps, which each new contact amplifies: measured 1e-9 of the distance; faults
+# are far larger.
 _SAME_NUMBERS = 1e-6
 
 
 def wall(factor: int, why_hard: str, expected: str) -> TrajectoryCase:
-    """A wall of `factor` times the stiffness K = 2 b / T of the bound; at 2000 times, T² K / m = 1.95, half of the
-    value at which the step diverges.
+    """A wall of `factor` times the stiffness K = 2 b / T of the bound; at 2000 times, T² K / m =
+    1.95, half of the value at which the step diverges.
     """
     values = {"contact.stiffness": factor * _BOUND, "contact.damping": 0.0, "duration": 3.0}
-    name = ("Stiff wall at" if factor == 1 else f"Wall {factor:,} times stiffer than") + " Colgate's passivity bound"
+    name = (
+        "Stiff wall at" if factor == 1 else f"Wall {factor:,} times stiffer than"
+    ) + " Colgate's passivity bound"
 
     def measure(run: Run) -> Measured:
-        """Measure the largest distance of the tool from the sampled law, relative to its initial gap to the wall."""
+        """Measure the largest distance of the tool from the sampled law, relative to its initial
+        gap to the wall."""
         truth = sampled_wall(run.law, factor * _BOUND, run.steps, run.dt)
         way = abs(float(run.q[0, 0])) - _RADIUS_OF_HANDLE
-        return Measured(largest_gain(run), NO_GAIN, float(np.abs(run.q[:, 0] - truth).max()) / way, _SAME_NUMBERS)
+        return Measured(
+            largest_gain(run),
+            NO_GAIN,
+            float(np.abs(run.q[:, 0] - truth).max()) / way,
+            _SAME_NUMBERS,
+        )
 
     return TrajectoryCase(
-        name, "Colgate and Schenkel, J. Robotic Systems 14 (1997); scenes/wall_1d.yaml", why_hard, expected,
-        "up to the bound, Colgate and Schenkel's theorem guarantees passivity; beyond the bound, we measure the energy "
-        "gain. The reference motion comes from a recursion for tool, device and sampled wall in one coordinate",
-        load_scene(find_scene("wall_1d")).with_values(values), measure,
-    )  # fmt: skip
+        name,
+        "Colgate and Schenkel, J. Robotic Systems 14 (1997); scenes/wall_1d.yaml",
+        why_hard,
+        expected,
+        "up to the bound, Colgate and Schenkel's theorem guarantees passivity; beyond the bound, "
+        "we measure the energy "
+        "gain. The reference motion comes from a recursion for tool, device and sampled wall in "
+        "one coordinate",
+        load_scene(find_scene("wall_1d")).with_values(values),
+        measure,
+    )
 
 
 def sampled_wall(law: str, stiffness: float, steps: int, dt: float) -> NDArray[np.float64]:
-    """Return the tool positions (steps + 1,) of two coupled masses and a wall that is sampled once per step."""
+    """Return the tool positions (steps + 1,) of two coupled masses and a wall that is sampled once
+    per step."""
     x = [-0.03, -0.03]
     v = [0.1, 0.1]
     touching, path = False, [x[0]]
@@ -105,11 +154,13 @@ def sampled_wall(law: str, stiffness: float, steps: int, dt: float) -> NDArray[n
     return np.array(path)
 
 
-# --- a peg wedged in its hole ------------------------------------------------------------------------------------
+# --- a peg wedged in its hole
+# ------------------------------------------------------------------------------------
 _STIFFNESS, _HAND, _DRAFT = 1000.0, 0.4, 0.01  # from scenes/peg_hole.yaml: [N/m], [N], slope
 _END = 0.0105  # y [m] of the peg's centre when its front meets the hole's end
 _STOPPED = 1e-9  # largest speed [m/s] of a body at rest: ten decades below that of the impact
-# Relative tolerance of the springs' rest position: after one second the coupling has settled to 1e-8.
+# Relative tolerance of the springs' rest position: after one second the coupling has settled to
+# 1e-8.
 _SETTLED = 1e-4
 
 
@@ -120,14 +171,17 @@ def wedged_peg_motion() -> TrajectoryCase:
         "paper section VII: at most six collisions at once, in a tight hole; numbers ours",
         "six gaps close in the same step; then the springs of six contacts carry the hand force",
         "the peg rests at the end of the hole, as deep as the springs of its six contacts allow",
-        "statics: 2 K δ + 4 K s² δ = F, with depth δ, hand force F, stiffness K of a contact, and s the sine of the "
+        "statics: 2 K δ + 4 K s² δ = F, with depth δ, hand force F, stiffness K of a contact, and "
+        "s the sine of the "
         "angle between the sides and the motion; with rigid contacts δ = 0",
-        load_scene(find_scene("peg_hole")), _measure_peg,
-    )  # fmt: skip
+        load_scene(find_scene("peg_hole")),
+        _measure_peg,
+    )
 
 
 def _measure_peg(run: Run) -> Measured:
-    """Measure the distance from the rest position in units of the static depth; a peg that still moves adds one."""
+    """Measure the distance from the rest position in units of the static depth; a peg that still
+    moves adds one."""
     sine = _DRAFT / math.hypot(1.0, _DRAFT)
     depth = _HAND / (2.0 * _STIFFNESS + 4.0 * _STIFFNESS * sine**2)
     place = _END if run.law == "rigid constraints" else _END - depth
@@ -136,38 +190,59 @@ def _measure_peg(run: Run) -> Measured:
     return Measured(largest_gain(run), NO_GAIN, off + moving, _SETTLED)
 
 
-# --- Newton's cradle whose balls touch ---------------------------------------------------------------------------
-# Radii and positions are binary fractions, so that gaps are exactly 0, or decimal fractions, so that gaps are rounding.
+# --- Newton's cradle whose balls touch
+# --------------------------------------------------------------------------- Radii and positions
+# are binary fractions, so that gaps are exactly 0, or decimal fractions, so that gaps are rounding.
 _CRADLE_STIFFNESS = 1e4
-# Undamped springs that are sampled once per step conserve energy up to the second-order error 2 K Δt² / m.
+# Undamped springs that are sampled once per step conserve energy up to the second-order error 2 K
+# Δt² / m.
 _BY_SPRINGS = 2.0 * _CRADLE_STIFFNESS * 1e-6
 
 
 def cradle(gap: float, words: str, radius: float = 0.015625) -> TrajectoryCase:
-    """A cradle whose balls are a gap apart; radii of whole centimetres leave gaps of a few 1e-18 m of either sign.
+    """A cradle whose balls are a gap apart; radii of whole centimetres leave gaps of a few 1e-18 m
+    of either sign.
 
-    A contact counts as new until it overlaps, so contacts with a gap of exactly 0 collide like those with a gap of one
-    micrometre. If they counted as old, springs would transmit the impact. Springs that are sampled once per step gain
-    up to 2 K Δt²/m, which is 0.21 % here, as the world PB shows.
+    A contact counts as new until it overlaps, so contacts with a gap of exactly 0 collide like
+    those with a gap of one micrometre. If they counted as old, springs would transmit the impact.
+    Springs that are sampled once per step gain up to 2 K Δt²/m, which is 0.21 % here, as the world
+    PB shows.
     """
     places = [-0.021875 - 2.0 * radius] + [k * (2.0 * radius + gap) for k in range(4)]
     balls = [ball(f"ball_{k}", radius, x, velocity=[float(k == 0)]) for k, x in enumerate(places)]
-    contact = {"stiffness": _CRADLE_STIFFNESS, "damping": 0.0, "restitution": 1.0, "coherence_distance": 2e-3}
-    scene = on_floor("touching_cradle", "Newton's cradle whose balls touch", balls, contact, duration=0.3, gravity=None,
-                     walls=[])
+    contact = {
+        "stiffness": _CRADLE_STIFFNESS,
+        "damping": 0.0,
+        "restitution": 1.0,
+        "coherence_distance": 2e-3,
+    }
+    scene = on_floor(
+        "touching_cradle",
+        "Newton's cradle whose balls touch",
+        balls,
+        contact,
+        duration=0.3,
+        gravity=None,
+        walls=[],
+    )
 
     def measure(run: Run) -> Measured:
-        """Measure the relative error of momentum and energy at the end; both must equal those of the first ball."""
+        """Measure the relative error of momentum and energy at the end; both must equal those of
+        the first ball."""
         v = run.v[-1]
         off = max(abs(float(v.sum()) - 1.0), abs(float(v @ v) - 1.0))
-        stored = 3.0 * 0.5 * _CRADLE_STIFFNESS * min(gap, 0.0) ** 2 / 0.5  # share of the energy in springs
+        stored = (
+            3.0 * 0.5 * _CRADLE_STIFFNESS * min(gap, 0.0) ** 2 / 0.5
+        )  # share of the energy in springs
         # Sampling the springs once per step adds up to a tenth.
         return Measured(largest_gain(run), NO_GAIN + 1.1 * stored, off, _BY_SPRINGS)
 
     return TrajectoryCase(
-        f"Newton's cradle, {words}", "textbook; the paper's rows (12)",
+        f"Newton's cradle, {words}",
+        "textbook; the paper's rows (12)",
         "new contacts transmit momentum by impulses, lasting ones by springs; rounding may decide if one is new",
         "momentum and energy are conserved, whichever balls leave",
         "momentum and energy of five equal elastic balls, the first at 1 m/s: Σ v = 1 and Σ v² = 1",
-        scene, measure,
-    )  # fmt: skip
+        scene,
+        measure,
+    )

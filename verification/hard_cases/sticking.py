@@ -1,8 +1,9 @@
-"""Cases of sticking friction: a nudged box that stops, and a box and a stack of boxes that stick on a slope.
+"""Cases of sticking friction: a nudged box that stops, and a box and a stack of boxes that stick on
+a slope.
 
-A friction force that is constant over a step can reverse the motion that it should stop. Law (6) of the paper is an
-explicit damper μ N / v_threshold, which is unstable if μ N Δt > 2 m v_threshold. Here μ N Δt / (m v_threshold) is 4.9
-for one box at the default threshold.
+A friction force that is constant over a step can reverse the motion that it should stop. Law (6) of
+the paper is an explicit damper μ N / v_threshold, which is unstable if μ N Δt > 2 m v_threshold.
+Here μ N Δt / (m v_threshold) is 4.9 for one box at the default threshold.
 """
 
 from __future__ import annotations
@@ -17,26 +18,49 @@ from verification.hard_cases.case import NO_GAIN, Measured, TrajectoryCase, larg
 
 _G, _MU = 9.81, 0.5
 _ENGINE = ("IAPB", "PB", "IAPB-friction")
-# Width and height [m], stiffness [N/m]. The slabs of a stack oscillate on their springs without slipping.
+# Width and height [m], stiffness [N/m]. The slabs of a stack oscillate on their springs without
+# slipping.
 BOX, SLAB = (0.15, 0.05, 1e4), (0.3, 0.02, 5e4)
 _LONG = 10.0  # [s]
-_SECOND_ORDER = 0.02  # relative error of the lean per box: the contact point lies at half the overlap
+_SECOND_ORDER = (
+    0.02  # relative error of the lean per box: the contact point lies at half the overlap
+)
 
 
 def _boxes(
     name: str, title: str, count: int, sort: tuple[float, float, float], slope: float, speed: float
 ) -> Scene:
-    """Return a scene of boxes of 1 kg on one another on a slope [rad]; each starts with its static overlap."""
+    """Return a scene of boxes of 1 kg on one another on a slope [rad]; each starts with its static
+    overlap."""
     (width, height, stiffness), level, boxes = sort, 0.0, []
     for k in range(count):
         level += height - (count - k) * _G * math.cos(slope) / (2.0 * stiffness)
-        boxes.append({"name": f"box_{k}", "joint": "planar", "mass": 1.0, "inertia": (width**2 + height**2) / 12.0,
-                      "position": [0.0, level - 0.5 * height, 0.0], "velocity": [speed, 0.0, 0.0],
-                      "shapes": [{"kind": "box", "size": [width, height]}]})  # fmt: skip
-    contact = {"forces": "implicit", "stiffness": stiffness, "damping": 50.0, "friction": _MU,
-               "coherence_distance": 2e-3}
-    return on_floor(name, title, boxes, contact, duration=_LONG,
-                    gravity=(_G * math.sin(slope), -_G * math.cos(slope)))  # fmt: skip
+        boxes.append(
+            {
+                "name": f"box_{k}",
+                "joint": "planar",
+                "mass": 1.0,
+                "inertia": (width**2 + height**2) / 12.0,
+                "position": [0.0, level - 0.5 * height, 0.0],
+                "velocity": [speed, 0.0, 0.0],
+                "shapes": [{"kind": "box", "size": [width, height]}],
+            }
+        )
+    contact = {
+        "forces": "implicit",
+        "stiffness": stiffness,
+        "damping": 50.0,
+        "friction": _MU,
+        "coherence_distance": 2e-3,
+    }
+    return on_floor(
+        name,
+        title,
+        boxes,
+        contact,
+        duration=_LONG,
+        gravity=(_G * math.sin(slope), -_G * math.cos(slope)),
+    )
 
 
 def nudged_box() -> TrajectoryCase:
@@ -45,47 +69,64 @@ def nudged_box() -> TrajectoryCase:
     way, stopped = speed**2 / (2.0 * _MU * _G), speed / (_MU * _G)
 
     def measure(run: Run) -> Measured:
-        """Measure the largest distance from the stopping place, from a tenth of a second after the stop on.
+        """Measure the largest distance from the stopping place, from a tenth of a second after the
+        stop on.
 
         The position of a first-order step is wrong by at most the distance of one step.
         """
         x = run.q[run.time > stopped + 0.1, 0]
-        return Measured(largest_gain(run), NO_GAIN, float(np.abs(x - way).max()) / way, speed * run.dt / way)
+        return Measured(
+            largest_gain(run), NO_GAIN, float(np.abs(x - way).max()) / way, speed * run.dt / way
+        )
 
     return TrajectoryCase(
-        "Nudged box", "Coulomb's law; a box on a floor",
+        "Nudged box",
+        "Coulomb's law; a box on a floor",
         "a friction force that is constant over a step can reverse the motion and drive the box across the floor",
         "the box stops where Coulomb's law predicts and stays there",
         f"Coulomb's law in closed form: the box slides by v²/(2 μ g) = {1e3 * way:.4g} mm",
-        _boxes("nudged_box", "A nudged box", 1, BOX, 0.0, speed), measure, _ENGINE,
-    )  # fmt: skip
+        _boxes("nudged_box", "A nudged box", 1, BOX, 0.0, speed),
+        measure,
+        _ENGINE,
+    )
 
 
-def on_a_slope(title: str, name: str, count: int, sort: tuple[float, float, float]) -> TrajectoryCase:
+def on_a_slope(
+    title: str, name: str, count: int, sort: tuple[float, float, float]
+) -> TrajectoryCase:
     """Boxes on one another on a slope of 20 degrees, for ten seconds."""
     slope = math.radians(20.0)
     leans = _lean(count, sort, slope)
 
     def measure(run: Run) -> Measured:
-        """Measure the distance of the upper box from its elastic deflection at the end, relative to the deflection."""
+        """Measure the distance of the upper box from its elastic deflection at the end, relative to
+        the deflection."""
         off = abs(float(run.q[-1, 3 * (count - 1)]) - leans)
         return Measured(largest_gain(run), NO_GAIN, off / leans, _SECOND_ORDER * count)
 
     return TrajectoryCase(
-        title, "Coulomb's law; springs of (5)",
+        title,
+        "Coulomb's law; springs of (5)",
         "a sticking contact must not creep; lever arms couple normal and friction forces",
         f"the {'upper ' * (count > 1)}box moves by {1e6 * leans:.3g} μm as the contact springs deflect, then stays",
         "no contact slips, because tan 20° < μ; force and moment deflect the contact springs between two faces",
-        _boxes(name, title, count, sort, slope, 0.0), measure, _ENGINE,
-    )  # fmt: skip
+        _boxes(name, title, count, sort, slope, 0.0),
+        measure,
+        _ENGINE,
+    )
 
 
 def _lean(count: int, sort: tuple[float, float, float], slope: float) -> float:
-    """Return the elastic displacement of the upper box's centre down the slope [m], to first order, without slip.
+    """Return the elastic displacement of the upper box's centre down the slope [m], to first order,
+    without slip.
 
-    Face k carries the moment g sin(slope) h (n − k)² / 2 of the boxes above it. The face rotates by this moment divided
-    by K w² / 2. The centre of the upper box is (n − 1 − k) h + h / 2 above the face.
+    Face k carries the moment g sin(slope) h (n − k)² / 2 of the boxes above it. The face rotates by
+    this moment divided by K w² / 2. The centre of the upper box is (n − 1 − k) h + h / 2 above the
+    face.
     """
     width, height, stiffness = sort
-    turns = [_G * math.sin(slope) * height * (count - k) ** 2 / (stiffness * width**2) for k in range(count)]
+    turns = [
+        _G * math.sin(slope) * height * (count - k) ** 2 / (stiffness * width**2)
+        for k in range(count)
+    ]
     return sum(turn * height * (count - k - 0.5) for k, turn in enumerate(turns))

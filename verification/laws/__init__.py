@@ -1,4 +1,5 @@
-"""Laws of every impact, their tolerances, planted bugs, and the passivity kit that tests any resolver."""
+"""Laws of every impact, their tolerances, planted bugs, and the passivity kit that tests any
+resolver."""
 
 from verification.impacts import ImpactCase as ImpactCase
 from verification.laws.bounds import LawResidual as LawResidual

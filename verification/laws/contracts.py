@@ -1,27 +1,33 @@
-"""Three contracts of an impact resolver: the arguments that it gets, and the laws that its answer keeps.
+"""Three contracts of an impact resolver: the arguments that it gets, and the laws that its answer
+keeps.
 
-``equality``: J v⁺ = −e J v⁻ on every row, impulses of either sign (the paper's (15)); its laws are `LAWS`. In the other
-two contracts, contacts only push. With u = Lᵀv, A = J L⁻ᵀ, γ = J v and Δu = u⁺ − u⁻ = Aᵀp:
+``equality``: J v⁺ = −e J v⁻ on every row, impulses of either sign (the paper's (15)); its laws are
+`LAWS`. In the other two contracts, contacts only push. With u = Lᵀv, A = J L⁻ᵀ, γ = J v and Δu = u⁺
+− u⁻ = Aᵀp:
 
-============ ============================================================ =============================================
-contract     the law of a textbook                                        source
-============ ============================================================ =============================================
-unilateral   0 ≤ p ⟂ γ⁺ + e γ⁻ ≥ 0 (Newton, Moreau)                       Moreau 1988; Glocker and Pfeiffer 1995
-unilateral   0 ≤ p_c ⟂ γ_c ≥ 0, then 0 ≤ p − (1 + e) p_c ⟂ γ⁺ ≥ 0         Poisson: Anitescu and Potra 1997
-frictional   K ∋ p ⟂ w + μ|w_t| n ∈ K*, w = γ⁺ + e γ⁻ on the normals      Coulomb: Moreau 1988; de Saxcé and Feng 1998
-============ ============================================================ =============================================
+============ ============================================================
+============================================= contract     the law of a textbook
+source ============ ============================================================
+============================================= unilateral   0 ≤ p ⟂ γ⁺ + e γ⁻ ≥ 0 (Newton, Moreau)
+Moreau 1988; Glocker and Pfeiffer 1995 unilateral   0 ≤ p_c ⟂ γ_c ≥ 0, then 0 ≤ p − (1 + e) p_c ⟂ γ⁺
+≥ 0         Poisson: Anitescu and Potra 1997 frictional   K ∋ p ⟂ w + μ|w_t| n ∈ K*, w = γ⁺ + e γ⁻
+on the normals      Coulomb: Moreau 1988; de Saxcé and Feng 1998 ============
+============================================================
+=============================================
 
-If every contact approaches and e is one number, Newton's and Poisson's laws have the same v⁺: p = (1 + e) p_c solves
-both, and v⁺ is unique. If only some contacts approach, the two laws differ, and v⁺ must satisfy one of them. Both kinds
-of resolver therefore keep all of UNILATERAL_LAWS. For a resolver with another law of restitution (sequential contacts,
-an energetic coefficient) choose the laws with ``laws=``: all laws except `OF_RESTITUTION` and those that compare calls
-hold for any contacts that only push.
+If every contact approaches and e is one number, Newton's and Poisson's laws have the same v⁺: p =
+(1 + e) p_c solves both, and v⁺ is unique. If only some contacts approach, the two laws differ, and
+v⁺ must satisfy one of them. Both kinds of resolver therefore keep all of UNILATERAL_LAWS. For a
+resolver with another law of restitution (sequential contacts, an energetic coefficient) choose the
+laws with ``laws=``: all laws except `OF_RESTITUTION` and those that compare calls hold for any
+contacts that only push.
 
-Coulomb's law with e > 0 may gain energy (Kane and Levinson 1985); ``kinetic_energy`` detects this gain. The laws for
-tangents use e = 0, for which all forms of Coulomb's law agree; they check one contact, and ``maximal_dissipation`` all
-contacts together if their rows are independent. The convex relaxation (Anitescu and Tasora 2010) gives impulses to
-contacts that separate while they slide, and breaks ``separating``. A friction pyramid inside the cone breaks, with two
-tangents, ``maximal_dissipation``; one around it breaks ``cone``.
+Coulomb's law with e > 0 may gain energy (Kane and Levinson 1985); ``kinetic_energy`` detects this
+gain. The laws for tangents use e = 0, for which all forms of Coulomb's law agree; they check one
+contact, and ``maximal_dissipation`` all contacts together if their rows are independent. The convex
+relaxation (Anitescu and Tasora 2010) gives impulses to contacts that separate while they slide, and
+breaks ``separating``. A friction pyramid inside the cone breaks, with two tangents,
+``maximal_dissipation``; one around it breaks ``cone``.
 """
 
 from __future__ import annotations
@@ -48,13 +54,26 @@ from verification.laws.resolver import Resolver, least_push, outcome, own_outcom
 
 TOUCHING = 1e-12  # relative to ‖Aᵢ‖ |u|: a smaller normal velocity counts as zero
 # Laws that call the resolver on variants of an impact.
-OF_VARIANTS = (*COMPARING, "no_impulse", "elastic", "separating", "sticking", "friction_opposes", "maximal_dissipation")
+OF_VARIANTS = (
+    *COMPARING,
+    "no_impulse",
+    "elastic",
+    "separating",
+    "sticking",
+    "friction_opposes",
+    "maximal_dissipation",
+)
 CLEAR = 0.05  # least singular value of one contact's unit rows, for laws that need its impulse
-_REFINEMENTS, _STEPS, NEAR = 20, 5000, 1e-8  # searches of a cone by rays and by steps; the distance that ends them
+_REFINEMENTS, _STEPS, NEAR = (
+    20,
+    5000,
+    1e-8,
+)  # searches of a cone by rays and by steps; the distance that ends them
 
 UNILATERAL_LAWS: dict[str, Law] = {name: LAWS[name] for name in ("kinetic_energy", "impulse_range")}
 FRICTIONAL_LAWS: dict[str, Law] = UNILATERAL_LAWS | {
-    "impulse_range": Law("M(v⁺ − v⁻) lies in range([Jᵀ Tᵀ])", LAWS["impulse_range"].check)}
+    "impulse_range": Law("M(v⁺ − v⁻) lies in range([Jᵀ Tᵀ])", LAWS["impulse_range"].check)
+}
 
 
 def _normal_velocities(case: ImpactCase, velocity: Floats) -> Floats:
@@ -66,7 +85,9 @@ def _normal_velocities(case: ImpactCase, velocity: Floats) -> Floats:
 
 def _before_and_after(case: ImpactCase, resolver: Resolver) -> tuple[Floats, Floats]:
     """γ⁻ and γ⁺, each (c,), relative to ‖Aᵢ‖ |u⁻|."""
-    return _normal_velocities(case, case.velocity), _normal_velocities(case, own_outcome(resolver, case))
+    return _normal_velocities(case, case.velocity), _normal_velocities(
+        case, own_outcome(resolver, case)
+    )
 
 
 def _all_approach(case: ImpactCase) -> bool:
@@ -81,7 +102,8 @@ def _change(case: ImpactCase, resolver: Resolver) -> Floats:
 @law(UNILATERAL_LAWS, "pushing", "M(v⁺ − v⁻) = Jᵀp with p ≥ 0: no contact pulls")
 @law(FRICTIONAL_LAWS, "cone", "M(v⁺ − v⁻) = Jᵀp + Tᵀp_t with |p_t| ≤ μ p at every contact")
 def contacts_only_push(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
-    """Distance of Δu, projected on the span of the rows, from {Aᵀp : p ≥ 0}; with friction from the sum of cones.
+    """Distance of Δu, projected on the span of the rows, from {Aᵀp : p ≥ 0}; with friction from the
+    sum of cones.
 
     p is not unique, so the law holds if any such p explains the motion.
     """
@@ -96,40 +118,54 @@ def contacts_only_push(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> 
 def distance_from_cone(case: ImpactCase, target: Floats) -> float:
     """Return the least |Aᵀp − target| over impulses p that push, each inside its friction cone.
 
-    The method is least squares over rays of the cones. With two tangents, each iteration adds two rays per contact: one
-    along the friction found, and one in the direction that reduces the remainder most. It cannot tell rays apart that
-    are close to parallel; accelerated projected gradients (O'Donoghue and Candès 2015) finish the search. Every p found
-    lies inside the cones, so the distance is never too small. It is NEAR or less if the target lies in the cones, and
-    NaN if the search ends before it can tell.
+    The method is least squares over rays of the cones. With two tangents, each iteration adds two
+    rays per contact: one along the friction found, and one in the direction that reduces the
+    remainder most. It cannot tell rays apart that are close to parallel; accelerated projected
+    gradients (O'Donoghue and Candès 2015) finish the search. Every p found lies inside the cones,
+    so the distance is never too small. It is NEAR or less if the target lies in the cones, and NaN
+    if the search ends before it can tell.
     """
     m = 0 if case.tangents is None else case.tangents.shape[1]
-    tangents = case.with_tangents.rows[case.contacts :].reshape(case.contacts, m, case.coordinates)  # T L⁻ᵀ
+    tangents = case.with_tangents.rows[case.contacts :].reshape(
+        case.contacts, m, case.coordinates
+    )  # T L⁻ᵀ
     friction = np.zeros(case.contacts) if case.friction is None else case.friction
-    fixed = np.repeat(np.vstack([np.zeros((1, m)), np.eye(m), -np.eye(m)])[None], case.contacts, axis=0)
+    fixed = np.repeat(
+        np.vstack([np.zeros((1, m)), np.eye(m), -np.eye(m)])[None], case.contacts, axis=0
+    )
     directions, distance = fixed, np.inf
     for _ in range(_REFINEMENTS):  # directions (c, k, m): k rays of each contact
-        rays = case.rows[:, None] + friction[:, None, None] * np.einsum("ckm,cmd->ckd", directions, tangents)
-        used, p = directions, least_push(rays.reshape(-1, case.coordinates), target).reshape(directions.shape[:2])
+        rays = case.rows[:, None] + friction[:, None, None] * np.einsum(
+            "ckm,cmd->ckd", directions, tangents
+        )
+        used, p = (
+            directions,
+            least_push(rays.reshape(-1, case.coordinates), target).reshape(directions.shape[:2]),
+        )
         rest = target - np.einsum("ck,ckd->d", p, rays)
         distance = min(distance, float(np.linalg.norm(rest)))
         if distance <= NEAR:
             return distance
-        if m < 2:  # the rays are all; least squares end early where a large p along nearly opposed ones is needed
+        if (
+            m < 2
+        ):  # the rays are all; least squares end early where a large p along nearly opposed ones is needed
             break
         more = np.stack([np.einsum("ck,ckm->cm", p, directions), tangents @ rest], axis=1)
         size = np.linalg.norm(more, axis=2, keepdims=True)
         more = np.divide(more, size, out=np.zeros_like(more), where=size > 0.0)
         directions = np.concatenate([fixed, more], axis=1)
     blocks = np.concatenate([case.rows[:, None], tangents], axis=1)
-    push = np.concatenate([p.sum(1)[:, None], friction[:, None] * np.einsum("ck,ckm->cm", p, used)], axis=1)
+    push = np.concatenate(
+        [p.sum(1)[:, None], friction[:, None] * np.einsum("ck,ckm->cm", p, used)], axis=1
+    )
     return _descend(blocks, friction, target, push)
 
 
 def _descend(blocks: Floats, friction: np.ndarray, target: Floats, p: Floats) -> float:
     """Return the least |Aᵀp − target| that steps from p (c, 1 + m) find, inside the cones, or NaN.
 
-    With r = target − Aᵀp, no p' has a remainder below (target·r − max over p' of p'·(A r)) / |r|. The search ends when
-    this shows that no p' up to ten times as large as p halves the distance.
+    With r = target − Aᵀp, no p' has a remainder below (target·r − max over p' of p'·(A r)) / |r|.
+    The search ends when this shows that no p' up to ten times as large as p halves the distance.
     """
     size = np.linalg.norm(blocks, axis=(1, 2))[:, None]
     size[size == 0.0] = 1.0
@@ -137,11 +173,15 @@ def _descend(blocks: Floats, friction: np.ndarray, target: Floats, p: Floats) ->
     length, moved, pace = 1.0 / max(float(np.linalg.norm(rows, 2)) ** 2, 1.0), p, 1.0
     nearest = np.inf
     for _ in range(_STEPS):
-        tried = project_on_cone(moved + length * (rows @ (target - moved.ravel() @ rows)).reshape(p.shape), friction)
+        tried = project_on_cone(
+            moved + length * (rows @ (target - moved.ravel() @ rows)).reshape(p.shape), friction
+        )
         rest = target - tried.ravel() @ rows
         nearest = min(nearest, float(np.linalg.norm(rest)))
         gained = (rows @ rest).reshape(p.shape)
-        most = float(np.max(gained[:, 0] + friction * np.linalg.norm(gained[:, 1:], axis=1), initial=0.0))
+        most = float(
+            np.max(gained[:, 0] + friction * np.linalg.norm(gained[:, 1:], axis=1), initial=0.0)
+        )
         if nearest <= NEAR or target @ rest - 10.0 * tried[:, 0].sum() * most > 0.5 * rest @ rest:
             return nearest
         if np.sum((moved - tried) * (tried - p)) > 0.0:
@@ -155,12 +195,15 @@ def _descend(blocks: Floats, friction: np.ndarray, target: Floats, p: Floats) ->
 def nothing_is_driven_in(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
     """Largest of min(0, −e γ⁻) − γ⁺, relative to ‖Aᵢ‖ |u|, for any law of restitution."""
     before, after = _before_and_after(case, resolver)
-    return float(np.max(np.minimum(0.0, -case.restitution * before) - after, initial=0.0)), bounds.restitution
+    return float(
+        np.max(np.minimum(0.0, -case.restitution * before) - after, initial=0.0)
+    ), bounds.restitution
 
 
 @law(UNILATERAL_LAWS, "restitution", "γ⁺ ≥ −e γ⁻ where every contact approaches")
 def restitution_is_met_or_exceeded(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
-    """Largest of −e γ⁻ − γ⁺, relative to ‖Aᵢ‖ |u|: Newton's inequality, which Poisson's law with one e keeps, too."""
+    """Largest of −e γ⁻ − γ⁺, relative to ‖Aᵢ‖ |u|: Newton's inequality, which Poisson's law with
+    one e keeps, too."""
     if not _all_approach(case):
         return None
     before, after = _before_and_after(case, resolver)
@@ -168,8 +211,11 @@ def restitution_is_met_or_exceeded(case: ImpactCase, resolver: Resolver, bounds:
 
 
 @law(UNILATERAL_LAWS, "complementarity", "p ⟂ γ⁺ + e γ⁻ where every contact approaches")
-def pushing_contacts_meet_restitution(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
-    """|pᵀ(γ⁺ + e γ⁻)| / |u⁻|² = |Δu·(u⁺ + e u⁻)| / |u⁻|²: known without p, which redundant rows do not determine."""
+def pushing_contacts_meet_restitution(
+    case: ImpactCase, resolver: Resolver, bounds: Bounds
+) -> Found:
+    """|pᵀ(γ⁺ + e γ⁻)| / |u⁻|² = |Δu·(u⁺ + e u⁻)| / |u⁻|²: known without p, which redundant rows do
+    not determine."""
     if not _all_approach(case) or case.speed == 0.0:
         return None
     u, change = case.u, _change(case, resolver)
@@ -177,12 +223,23 @@ def pushing_contacts_meet_restitution(case: ImpactCase, resolver: Resolver, boun
     return value, 2.0 * bounds.restitution
 
 
-@law(UNILATERAL_LAWS, "mixed_restitution",
-     "v⁺ is Newton's or Poisson's where some contacts approach and others separate")
-def mixed_impacts_follow_newton_or_poisson(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
-    """Smaller of the distances of v⁺ from Newton's and from Poisson's v⁺; each of these is unique (a projection)."""
+@law(
+    UNILATERAL_LAWS,
+    "mixed_restitution",
+    "v⁺ is Newton's or Poisson's where some contacts approach and others separate",
+)
+def mixed_impacts_follow_newton_or_poisson(
+    case: ImpactCase, resolver: Resolver, bounds: Bounds
+) -> Found:
+    """Smaller of the distances of v⁺ from Newton's and from Poisson's v⁺; each of these is unique
+    (a projection)."""
     before = _normal_velocities(case, case.velocity)
-    if not case.is_separated or case.speed == 0.0 or not np.any(before < -TOUCHING) or not np.any(before > TOUCHING):
+    if (
+        not case.is_separated
+        or case.speed == 0.0
+        or not np.any(before < -TOUCHING)
+        or not np.any(before > TOUCHING)
+    ):
         return None
     u, rows, e = case.u, case.unit_rows, case.restitution
     newton = u + (1.0 + e) * (rows.T @ least_push(rows, -u))
@@ -196,7 +253,10 @@ def mixed_impacts_follow_newton_or_poisson(case: ImpactCase, resolver: Resolver,
 def separating_contacts_do_nothing(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
     """Distance of v⁺ from v⁻ after the normals are turned so that no contact approaches."""
     J = case.contact_jacobian
-    v_plus = outcome(resolver, replace(case, contact_jacobian=np.where((J @ case.velocity < 0.0)[:, None], -J, J)))
+    v_plus = outcome(
+        resolver,
+        replace(case, contact_jacobian=np.where((J @ case.velocity < 0.0)[:, None], -J, J)),
+    )
     return case.distance(v_plus, case.velocity), bounds.restitution
 
 
@@ -206,14 +266,21 @@ def elastic_approach_conserves(case: ImpactCase, resolver: Resolver, bounds: Bou
     return elastic_conserves(case, resolver, bounds) if _all_approach(case) else None
 
 
-FRICTIONAL_LAWS |= {name: UNILATERAL_LAWS[name] for name in ("no_penetration", "restitution", "separating")}
+FRICTIONAL_LAWS |= {
+    name: UNILATERAL_LAWS[name] for name in ("no_penetration", "restitution", "separating")
+}
 # Laws that compare two calls: v⁺ of contacts that only push is unique, even if p is not.
-UNILATERAL_LAWS |= {name: LAWS[name] for name in (*COMPARING, "arguments") if name not in ("redundancy", "row_scaling")}
+UNILATERAL_LAWS |= {
+    name: LAWS[name]
+    for name in (*COMPARING, "arguments")
+    if name not in ("redundancy", "row_scaling")
+}
 
 
 # Friction without restitution, at a single contact or at all contacts together.
 class _Tried(NamedTuple):
-    """A case with e = 0, its independent rows (normals, then tangents; (c + c m, d)) as given and whitened, W and μ."""
+    """A case with e = 0, its independent rows (normals, then tangents; (c + c m, d)) as given and
+    whitened, W and μ."""
 
     case: ImpactCase
     given: Floats
@@ -223,31 +290,46 @@ class _Tried(NamedTuple):
 
 
 def _tried(case: ImpactCase) -> _Tried | None:
-    """The case with its rows and W; None if the rows are too close to dependent to determine the impulses."""
+    """The case with its rows and W; None if the rows are too close to dependent to determine the
+    impulses."""
     every = case.with_tangents
     if case.friction is None or every.contacts > case.coordinates:
         return None
     if np.linalg.svd(every.unit_rows, compute_uv=False)[-1] < CLEAR:
         return None
-    return _Tried(case, every.contact_jacobian, every.rows, every.rows @ every.rows.T, case.friction)
+    return _Tried(
+        case, every.contact_jacobian, every.rows, every.rows @ every.rows.T, case.friction
+    )
 
 
 def _single(case: ImpactCase) -> _Tried | None:
-    """The first contact alone; None if it hardly approaches or its rows are too close to dependent."""
+    """The first contact alone; None if it hardly approaches or its rows are too close to
+    dependent."""
     if case.tangents is None or case.friction is None or case.contacts == 0 or case.speed == 0.0:
         return None
-    alone = replace(case, contact_jacobian=case.contact_jacobian[:1], tangents=case.tangents[:1],
-                    friction=case.friction[:1], restitution=0.0, translations=None)
+    alone = replace(
+        case,
+        contact_jacobian=case.contact_jacobian[:1],
+        tangents=case.tangents[:1],
+        friction=case.friction[:1],
+        restitution=0.0,
+        translations=None,
+    )
     return None if _normal_velocities(alone, case.velocity)[0] > -CLEAR else _tried(alone)
 
 
-@law(FRICTIONAL_LAWS, "sticking", "one contact, e = 0: it sticks where Coulomb's law leaves no other answer")
+@law(
+    FRICTIONAL_LAWS,
+    "sticking",
+    "one contact, e = 0: it sticks where Coulomb's law leaves no other answer",
+)
 def contacts_stick_where_they_can(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
-    """|v_t⁺| / (‖A_t‖ |u|) of one contact with e = 0, if p = −W⁻¹γ⁻ lies so far inside the cone that p is unique.
+    """|v_t⁺| / (‖A_t‖ |u|) of one contact with e = 0, if p = −W⁻¹γ⁻ lies so far inside the cone
+    that p is unique.
 
-    Any other solution p' of Coulomb's law slides, so |p'_t| = μ p'_n. With (p' − p)ᵀW(p' − p) ≥ 0 this gives
-    μ p'_n ≤ |p_t|. Both solutions have w_n = 0, which gives p_n − p'_n ≤ κ (p'_n + |p_t|/μ) with κ = μ|W_nt|/W_nn. Both
-    inequalities hold only if μ p_n ≤ (1 + 2κ)|p_t|.
+    Any other solution p' of Coulomb's law slides, so |p'_t| = μ p'_n. With (p' − p)ᵀW(p' − p) ≥ 0
+    this gives μ p'_n ≤ |p_t|. Both solutions have w_n = 0, which gives p_n − p'_n ≤ κ (p'_n +
+    |p_t|/μ) with κ = μ|W_nt|/W_nn. Both inequalities hold only if μ p_n ≤ (1 + 2κ)|p_t|.
     """
     single = _single(case)
     if single is None:
@@ -264,7 +346,8 @@ def contacts_stick_where_they_can(case: ImpactCase, resolver: Resolver, bounds: 
 
 @law(FRICTIONAL_LAWS, "friction_opposes", "one contact, e = 0: p_t·v_t⁺ ≤ 0")
 def friction_opposes_sliding(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
-    """p_t·v_t⁺ / |u|² of one contact with e = 0; it is positive if friction pushes in the direction of sliding."""
+    """p_t·v_t⁺ / |u|² of one contact with e = 0; it is positive if friction pushes in the direction
+    of sliding."""
     single = _single(case)
     if single is None:
         return None
@@ -273,10 +356,11 @@ def friction_opposes_sliding(case: ImpactCase, resolver: Resolver, bounds: Bound
 
 @law(FRICTIONAL_LAWS, "maximal_dissipation", "e = 0: p_t·v_t⁺ = −μ p |v_t⁺| at every contact")
 def sliding_dissipates_most(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
-    """Largest |p_t·v_t⁺ + μ p_n |v_t⁺|| / |u|² of a contact with e = 0; 0 if friction at its limit opposes sliding.
+    """Largest |p_t·v_t⁺ + μ p_n |v_t⁺|| / |u|² of a contact with e = 0; 0 if friction at its limit
+    opposes sliding.
 
-    The law checks all contacts together if their rows determine every impulse, else the first contact alone. It skips
-    contacts that pull; ``cone`` detects those.
+    The law checks all contacts together if their rows determine every impulse, else the first
+    contact alone. It skips contacts that pull; ``cone`` detects those.
     """
     several = case.tangents is not None and case.contacts > 1 and case.speed > 0.0
     tried = (_tried(replace(case, restitution=0.0)) if several else None) or _single(case)
@@ -287,7 +371,8 @@ def sliding_dissipates_most(case: ImpactCase, resolver: Resolver, bounds: Bounds
 
 
 def _friction_power(tried: _Tried, resolver: Resolver) -> tuple[Floats, Floats]:
-    """p_t·v_t⁺ and μ p_n |v_t⁺| of each contact (c,), both relative to |u|²; 0 for a contact that pulls."""
+    """p_t·v_t⁺ and μ p_n |v_t⁺| of each contact (c,), both relative to |u|²; 0 for a contact that
+    pulls."""
     case = tried.case
     v_plus = outcome(resolver, case)
     p = np.linalg.solve(tried.delassus, tried.rows @ (case.lower.T @ (v_plus - case.velocity)))
@@ -302,8 +387,11 @@ FRICTIONAL_LAWS |= {name: LAWS[name] for name in ("momentum", "repeatability", "
 
 
 def no_gain_in_real_arithmetic(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual:
-    """(KE⁺ − KE⁻)/KE⁻ in rationals on the doubles, with tolerance 0; infinite if motion appears from rest."""
-    relative = certificate.relative_gain(case.mass_matrix, case.velocity, own_outcome(resolver, case))
+    """(KE⁺ − KE⁻)/KE⁻ in rationals on the doubles, with tolerance 0; infinite if motion appears
+    from rest."""
+    relative = certificate.relative_gain(
+        case.mass_matrix, case.velocity, own_outcome(resolver, case)
+    )
     return LawResidual("exact_energy", relative, 0.0, bounds.energy_gain(case))
 
 
@@ -334,15 +422,23 @@ class Contract(NamedTuple):
 
 
 _UNJUDGED_FRICTION = (
-    "how much friction there is with e > 0, or at several contacts whose rows depend on each other (it stays in its "
+    "how much friction there is with e > 0, or at several contacts whose rows depend on each "
+    "other (it stays in its "
     "cone); restitution where only some contacts approach; a rebound faster than e asks for"
 )
 
 
 CONTRACTS: dict[str, Contract] = {
     "equality": Contract(LAWS | EXACT_LAWS, KIT, 1e8, draw_wide_case, "LAWS", adverse_cases, -1.0),
-    "unilateral": Contract(UNILATERAL_LAWS | EXACT_LAWS, ONE_SIDED, 1e4, draw_one_sided_case,
-                           "UNILATERAL_LAWS"),
-    "frictional": Contract(FRICTIONAL_LAWS | EXACT_LAWS, ONE_SIDED, 1e2, draw_frictional_case,
-                           "FRICTIONAL_LAWS", unjudged=_UNJUDGED_FRICTION),
+    "unilateral": Contract(
+        UNILATERAL_LAWS | EXACT_LAWS, ONE_SIDED, 1e4, draw_one_sided_case, "UNILATERAL_LAWS"
+    ),
+    "frictional": Contract(
+        FRICTIONAL_LAWS | EXACT_LAWS,
+        ONE_SIDED,
+        1e2,
+        draw_frictional_case,
+        "FRICTIONAL_LAWS",
+        unjudged=_UNJUDGED_FRICTION,
+    ),
 }

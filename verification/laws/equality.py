@@ -1,6 +1,8 @@
-"""The laws of every impact, `LAWS`, and those that also hold with one restitution per row, `UNEQUAL_LAWS`.
+"""The laws of every impact, `LAWS`, and those that also hold with one restitution per row,
+`UNEQUAL_LAWS`.
 
-A law returns its residual and tolerance, or None if it does not apply. To add a law, write its function here.
+A law returns its residual and tolerance, or None if it does not apply. To add a law, write its
+function here.
 """
 
 from __future__ import annotations
@@ -17,8 +19,18 @@ LAWS: dict[str, Law] = {}
 # Laws that need only the answer for the impact itself; they share this answer.
 OF_ONE_CALL = ("kinetic_energy", "restitution", "impulse_range", "arguments")
 # Laws that compare the answer for the impact with answers for variants of it that have the same e.
-COMPARING = ("free_motion", "momentum", "redundancy", "duplicated_rows", "row_order", "row_scaling", "units",
-             "coordinates", "groups", "repeatability")
+COMPARING = (
+    "free_motion",
+    "momentum",
+    "redundancy",
+    "duplicated_rows",
+    "row_order",
+    "row_scaling",
+    "units",
+    "coordinates",
+    "groups",
+    "repeatability",
+)
 _SEED = 20050621  # the same z for the same case, so that a failure repeats
 _POWERS = np.array([0, 7, -5, 12, -11, 3])
 _FACTORS = np.array([3.0, 0.1, 7e2, 1.0, 1.3e-3])
@@ -26,30 +38,42 @@ _UNITS = np.array([1.0, 30.0, 0.02, 5.0, 0.7])  # mild: the laws' bounds grow wi
 
 
 def _varied(case: ImpactCase, mass: Floats, rows: Floats, velocity: Floats) -> ImpactCase:
-    return replace(case, mass_matrix=mass, contact_jacobian=rows, velocity=velocity, translations=None)
+    return replace(
+        case, mass_matrix=mass, contact_jacobian=rows, velocity=velocity, translations=None
+    )
 
 
 @law(LAWS, "kinetic_energy", "KE⁺ ≤ KE⁻")
 def kinetic_energy_never_rises(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
-    """Theorems 1 and 2, for every e in [−1, 1]; the tolerance is the gain that rounding can cause."""
-    return relative_gain(case.mass_matrix, case.velocity, own_outcome(resolver, case)), bounds.energy_gain(case)
+    """Theorems 1 and 2, for every e in [−1, 1]; the tolerance is the gain that rounding can
+    cause."""
+    return relative_gain(
+        case.mass_matrix, case.velocity, own_outcome(resolver, case)
+    ), bounds.energy_gain(case)
 
 
 @law(LAWS, "restitution", "J v⁺ = −e J v⁻ on every row")
 def restitution_is_met(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
-    """(15), dependent rows included: max |Jᵢv⁺ + e Jᵢv⁻| / ‖Aᵢ‖, relative to max |Jᵢv⁻| / ‖Aᵢ‖, or |u| if this is 0.
+    """(15), dependent rows included: max |Jᵢv⁺ + e Jᵢv⁻| / ‖Aᵢ‖, relative to max |Jᵢv⁻| / ‖Aᵢ‖, or
+    |u| if this is 0.
 
-    The products Lᵀv⁻ and L⁻ᵀu⁺ are exact for an L that is wrong by d ε |L| (Higham 2002, theorem 8.5), which moves
-    Jᵢv⁺ / ‖Aᵢ‖ by d ε ‖|Lᵀ||v|‖ at most: |u| √κ(M) d ε in the worst case. A solver that multiplies by an inverse adds
-    d ε / σ, for rows of smallest singular value σ. A resolver may drop a row that others nearly determine, and choose
-    which of these rows it uses; the limit is then `bounds.restitution`, relative to |u|.
+    The products Lᵀv⁻ and L⁻ᵀu⁺ are exact for an L that is wrong by d ε |L| (Higham 2002, theorem
+    8.5), which moves Jᵢv⁺ / ‖Aᵢ‖ by d ε ‖|Lᵀ||v|‖ at most: |u| √κ(M) d ε in the worst case. A
+    solver that multiplies by an inverse adds d ε / σ, for rows of smallest singular value σ. A
+    resolver may drop a row that others nearly determine, and choose which of these rows it uses;
+    the limit is then `bounds.restitution`, relative to |u|.
     """
     v_plus = own_outcome(resolver, case)
     unmet = case.unmet_restitution(v_plus)
     if case.speed == 0.0 or case.contacts == 0:
         return unmet, bounds.restitution
     seen = float(np.max(np.abs(case.unit_rows @ case.u))) / case.speed
-    spread = sum(float(np.linalg.norm(np.abs(case.lower.T) @ np.abs(v))) for v in (case.velocity, v_plus)) / case.speed
+    spread = (
+        sum(
+            float(np.linalg.norm(np.abs(case.lower.T) @ np.abs(v))) for v in (case.velocity, v_plus)
+        )
+        / case.speed
+    )
     rounding = 100.0 * case.coordinates * EPS * (spread + 1.0 / case.smallest_motion)
     limit = max(bounds.least, min(rounding if case.is_independent else np.inf, bounds.restitution))
     scale = seen if seen > limit else 1.0
@@ -88,12 +112,15 @@ def free_motion_is_kept(case: ImpactCase, resolver: Resolver, bounds: Bounds) ->
 def minus_one_is_no_impulse(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
     """C09; the tolerance covers the rounding ε √κ(M) of the return from whitened coordinates."""
     v_plus = outcome(resolver, replace(case, restitution=-1.0))
-    return case.distance(v_plus, case.velocity), 100.0 * case.coordinates * EPS * float(case.condition**0.5)
+    return case.distance(v_plus, case.velocity), 100.0 * case.coordinates * EPS * float(
+        case.condition**0.5
+    )
 
 
 @law(LAWS, "elastic", "e = 1 conserves KE")
 def elastic_conserves(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
-    """C04. The clamp may cause a loss up to Cholesky's error d ε κ(M), which can exceed the bound of the gain."""
+    """C04. The clamp may cause a loss up to Cholesky's error d ε κ(M), which can exceed the bound
+    of the gain."""
     v_plus = outcome(resolver, replace(case, restitution=1.0))
     gain = relative_gain(case.mass_matrix, case.velocity, v_plus)
     return abs(gain), max(bounds.energy_gain(case), bounds.comparison(case))
@@ -101,7 +128,8 @@ def elastic_conserves(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> F
 
 @law(LAWS, "momentum", "momentum along every free translation is conserved, in any frame")
 def momentum_is_conserved(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
-    """A translation of all bodies changes no contact velocity, so its momentum is conserved, in every frame.
+    """A translation of all bodies changes no contact velocity, so its momentum is conserved, in
+    every frame.
 
     The energy law alone does not detect the paper's per-body rows (13)-(14); this law does.
     """
@@ -110,7 +138,8 @@ def momentum_is_conserved(case: ImpactCase, resolver: Resolver, bounds: Bounds) 
 
 
 def _change_and_ride(case: ImpactCase, resolver: Resolver) -> tuple[float, float] | None:
-    """Return the largest |zᵀM(v⁺ − v⁻)| / (|z|_M |u|) and distance of f(v + z) from f(v) + z over translations z."""
+    """Return the largest |zᵀM(v⁺ − v⁻)| / (|z|_M |u|) and distance of f(v + z) from f(v) + z over
+    translations z."""
     if case.translations is None or case.speed == 0.0 or not case.is_separated:
         return None
     v_plus, changed, apart = own_outcome(resolver, case), 0.0, 0.0
@@ -146,7 +175,9 @@ def duplicated_rows_change_nothing(case: ImpactCase, resolver: Resolver, bounds:
     doubled = replace(case, contact_jacobian=np.vstack([case.contact_jacobian, copies, copies[:1]]))
     if not doubled.is_separated:
         return None
-    return case.distance(own_outcome(resolver, case), outcome(resolver, doubled)), bounds.comparison(case)
+    return case.distance(
+        own_outcome(resolver, case), outcome(resolver, doubled)
+    ), bounds.comparison(case)
 
 
 @law(LAWS, "row_order", "the order of the rows does not matter")
@@ -155,12 +186,15 @@ def row_order_does_not_matter(case: ImpactCase, resolver: Resolver, bounds: Boun
     if not case.is_separated or case.contacts < 2:
         return None
     reversed_rows = replace(case, contact_jacobian=case.contact_jacobian[::-1].copy())
-    return case.distance(own_outcome(resolver, case), outcome(resolver, reversed_rows)), bounds.comparison(case)
+    return case.distance(
+        own_outcome(resolver, case), outcome(resolver, reversed_rows)
+    ), bounds.comparison(case)
 
 
 @law(LAWS, "row_scaling", "the scale of a row does not matter")
 def row_scale_does_not_matter(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
-    """Distance between the velocities; infinite if a power of two changed a bit although the bounds forbid it.
+    """Distance between the velocities; infinite if a power of two changed a bit although the bounds
+    forbid it.
 
     A row times a positive number is the same contact in other units.
     """
@@ -168,7 +202,10 @@ def row_scale_does_not_matter(case: ImpactCase, resolver: Resolver, bounds: Boun
         return None
     plain, rows = own_outcome(resolver, case), case.contact_jacobian
     by_powers, by_factors = (
-        outcome(resolver, replace(case, contact_jacobian=rows * np.resize(factors, case.contacts)[:, None]))
+        outcome(
+            resolver,
+            replace(case, contact_jacobian=rows * np.resize(factors, case.contacts)[:, None]),
+        )
         for factors in (np.ldexp(1.0, _POWERS), _FACTORS)
     )
     worst = max(case.distance(plain, by_powers), case.distance(plain, by_factors))
@@ -182,19 +219,24 @@ def units_do_not_matter(case: ImpactCase, resolver: Resolver, bounds: Bounds) ->
     if not case.is_separated:
         return None
     s = np.resize(_UNITS, case.coordinates)
-    other = _varied(case, s[:, None] * case.mass_matrix * s, case.contact_jacobian * s, case.velocity / s)
+    other = _varied(
+        case, s[:, None] * case.mass_matrix * s, case.contact_jacobian * s, case.velocity / s
+    )
     tolerance = max(bounds.comparison(case), bounds.comparison(other))
     return case.distance(own_outcome(resolver, case), s * outcome(resolver, other)), tolerance
 
 
 @law(LAWS, "coordinates", "the choice of coordinates does not matter")
 def coordinates_do_not_matter(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
-    """C06: q' = T⁻¹q gives v'⁺ = T⁻¹v⁺; T = I + (cyclic shift)/2 has a condition number of at most 3."""
+    """C06: q' = T⁻¹q gives v'⁺ = T⁻¹v⁺; T = I + (cyclic shift)/2 has a condition number of at most
+    3."""
     if not case.is_separated:
         return None
     T = np.eye(case.coordinates) + 0.5 * np.roll(np.eye(case.coordinates), 1, axis=1)
     mass = T.T @ case.mass_matrix @ T
-    other = _varied(case, 0.5 * (mass + mass.T), case.contact_jacobian @ T, np.linalg.solve(T, case.velocity))
+    other = _varied(
+        case, 0.5 * (mass + mass.T), case.contact_jacobian @ T, np.linalg.solve(T, case.velocity)
+    )
     if not other.is_separated:
         return None
     tolerance = max(bounds.comparison(case), bounds.comparison(other))
@@ -203,13 +245,18 @@ def coordinates_do_not_matter(case: ImpactCase, resolver: Resolver, bounds: Boun
 
 @law(LAWS, "groups", "bodies that share no contact do not influence each other")
 def groups_do_not_interact(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
-    """Distance between the velocities of the case and its mirror image, resolved together and separately."""
+    """Distance between the velocities of the case and its mirror image, resolved together and
+    separately."""
     if not case.is_separated or case.speed == 0.0:
         return None
     mass, rows, v, d = *case.arrays, case.coordinates
     mirror, blocks = -rows[::-1], (np.zeros_like(mass), np.zeros_like(rows))
-    together = _varied(case, np.block([[mass, blocks[0]], [blocks[0], mass]]),
-                       np.block([[rows, blocks[1]], [blocks[1], mirror]]), np.concatenate([v, -2.0 * v]))
+    together = _varied(
+        case,
+        np.block([[mass, blocks[0]], [blocks[0], mass]]),
+        np.block([[rows, blocks[1]], [blocks[1], mirror]]),
+        np.concatenate([v, -2.0 * v]),
+    )
     both, alone = outcome(resolver, together), own_outcome(resolver, case)
     mirrored = outcome(resolver, replace(case, contact_jacobian=mirror.copy(), velocity=-2.0 * v))
     distance = max(case.distance(both[:d], alone), case.distance(both[d:], mirrored))
@@ -220,7 +267,10 @@ def groups_do_not_interact(case: ImpactCase, resolver: Resolver, bounds: Bounds)
 def same_input_same_output(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
     """0 if the bits agree after another impact was resolved in between, else 1."""
     first = own_outcome(resolver, case)
-    outcome(resolver, replace(case, contact_jacobian=case.contact_jacobian[::-1] + 0.5, velocity=-case.velocity))
+    outcome(
+        resolver,
+        replace(case, contact_jacobian=case.contact_jacobian[::-1] + 0.5, velocity=-case.velocity),
+    )
     return 0.0 if np.array_equal(first, outcome(resolver, case)) else 1.0, 0.0
 
 
@@ -239,12 +289,14 @@ UNEQUAL_LAWS: dict[str, Law] = {
 
 @law(UNEQUAL_LAWS, "unequal_momentum", UNEQUAL_LAWS["unequal_momentum"].statement)
 def momentum_is_conserved_unequal(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
-    """The law of momentum for unequal restitutions; each of the two residuals is divided by its own tolerance.
+    """The law of momentum for unequal restitutions; each of the two residuals is divided by its own
+    tolerance.
 
-    With unequal restitutions the sign of a contact's velocity matters, and a grazing contact within the restitution's
-    tolerance may approach in one frame and separate in another. In addition, an impulse |Δu| ≤ √g |u| changes the
-    energy by less than the gain g that rounding can cause, so the clamp may remove it in one frame (of speed 2|u| at
-    most) and keep it in another. Neither reason applies to the momentum itself.
+    With unequal restitutions the sign of a contact's velocity matters, and a grazing contact within
+    the restitution's tolerance may approach in one frame and separate in another. In addition, an
+    impulse |Δu| ≤ √g |u| changes the energy by less than the gain g that rounding can cause, so the
+    clamp may remove it in one frame (of speed 2|u| at most) and keep it in another. Neither reason
+    applies to the momentum itself.
     """
     found = _change_and_ride(case, resolver)
     if found is None:

@@ -1,4 +1,5 @@
-"""The laws on many cases: each part has its own kind of case, and each case has its own seed, which draws it again.
+"""The laws on many cases: each part has its own kind of case, and each case has its own seed, which
+draws it again.
 
 `plan` returns the batches of cases, and `judge_batch` judges one batch.
 """
@@ -26,16 +27,41 @@ from verification.laws.resolver import Resolver
 from verification.laws.scenes import draw_scene, draw_spatial_scene
 from verification.laws.trajectories import judge_run
 
-IMPACTS, UNEQUAL, TRAJECTORIES, IN_SPACE = "impacts", "unequal restitution", "trajectories", "trajectories in space"
-PARTS = (IMPACTS, UNEQUAL, TRAJECTORIES, *ENGINE_LAWS, IN_SPACE)  # the seeds depend on the order: add at the end
+IMPACTS, UNEQUAL, TRAJECTORIES, IN_SPACE = (
+    "impacts",
+    "unequal restitution",
+    "trajectories",
+    "trajectories in space",
+)
+PARTS = (
+    IMPACTS,
+    UNEQUAL,
+    TRAJECTORIES,
+    *ENGINE_LAWS,
+    IN_SPACE,
+)  # the seeds depend on the order: add at the end
 SCENES = {TRAJECTORIES: draw_scene, IN_SPACE: draw_spatial_scene}
-# Laws that need one call check every impact. The other laws also call the resolver on up to three variants of the
-# impact, with an SVD each; each of them checks its own sample of one impact in ONE_IN.
+# Laws that need one call check every impact. The other laws also call the resolver on up to three
+# variants of the impact, with an SVD each; each of them checks its own sample of one impact in
+# ONE_IN.
 ONE_IN = 10
 # Cases of a part per requested impact or trajectory, and cases per batch (a few seconds of work).
-_SHARE = {UNEQUAL: 0.1, "truncation": 0.05, "device_limits": 0.05, "extremes": 0.1, "hand_port": 0.02}
+_SHARE = {
+    UNEQUAL: 0.1,
+    "truncation": 0.05,
+    "device_limits": 0.05,
+    "extremes": 0.1,
+    "hand_port": 0.02,
+}
 _PER_TRAJECTORY = {IN_SPACE: 0.4, "group_splitting": 0.2, "device_port": 0.1}
-BATCH = {IMPACTS: 4000, UNEQUAL: 4000, TRAJECTORIES: 50, IN_SPACE: 50, "group_splitting": 20, "device_port": 20}
+BATCH = {
+    IMPACTS: 4000,
+    UNEQUAL: 4000,
+    TRAJECTORIES: 50,
+    IN_SPACE: 50,
+    "group_splitting": 20,
+    "device_port": 20,
+}
 _BATCH = 2000
 ENGINE_CONDITION = 1e10  # largest κ(M) in tests of the engine
 ANY_CONDITION = 1e8  # largest κ(M) in tests of any other resolver
@@ -43,7 +69,8 @@ ANY_CONDITION = 1e8  # largest κ(M) in tests of any other resolver
 
 @dataclass(frozen=True)
 class Subject:
-    """What is tested: a resolver, its tolerances, the largest κ(M) of its impacts, the seed of all draws."""
+    """What is tested: a resolver, its tolerances, the largest κ(M) of its impacts, the seed of all
+    draws."""
 
     resolver: Resolver
     bounds: Bounds
@@ -52,7 +79,8 @@ class Subject:
 
 
 def subject_of(resolver: Resolver, seed: int = 0) -> Subject:
-    """Return the subject of a resolver; the engine's own has tighter tolerances and worse mass matrices."""
+    """Return the subject of a resolver; the engine's own has tighter tolerances and worse mass
+    matrices."""
     if resolver is resolve_impact:
         return Subject(resolver, FACTORED, ENGINE_CONDITION, seed)
     return Subject(resolver, KIT, ANY_CONDITION, seed)
@@ -69,7 +97,8 @@ class Batch:
 
 @dataclass(frozen=True)
 class Found:
-    """A case that breaks a law: the law, the part and index of the case, the case, and its run if it is a scene."""
+    """A case that breaks a law: the law, the part and index of the case, the case, and its run if
+    it is a scene."""
 
     law: str
     part: str
@@ -88,12 +117,17 @@ class Outcome:
 
 
 def plan(impacts: int, trajectories: int, parts: tuple[str, ...] = PARTS) -> tuple[Batch, ...]:
-    """Return the batches for these numbers of impacts and trajectories; the other parts get numbers in proportion."""
+    """Return the batches for these numbers of impacts and trajectories; the other parts get numbers
+    in proportion."""
     totals = {IMPACTS: impacts, TRAJECTORIES: trajectories}
     totals |= {part: round(share * impacts) for part, share in _SHARE.items()}
     totals |= {part: round(share * trajectories) for part, share in _PER_TRAJECTORY.items()}
-    return tuple(Batch(part, first, min(size, totals[part] - first))
-                 for part in parts for size in (BATCH.get(part, _BATCH),) for first in range(0, totals[part], size))
+    return tuple(
+        Batch(part, first, min(size, totals[part] - first))
+        for part in parts
+        for size in (BATCH.get(part, _BATCH),)
+        for first in range(0, totals[part], size)
+    )
 
 
 def drawn(part: str, index: int, subject: Subject) -> Any:
@@ -108,14 +142,21 @@ def drawn(part: str, index: int, subject: Subject) -> Any:
 
 
 def tried_laws(part: str, index: int) -> Iterator[str]:
-    """Yield the impact laws that check case `index` of a part; a hash of law and index selects the sampled ones."""
+    """Yield the impact laws that check case `index` of a part; a hash of law and index selects the
+    sampled ones."""
     for name in UNEQUAL_LAWS if part == UNEQUAL else LAWS:
-        if name.removeprefix("unequal_") in OF_ONE_CALL or zlib.crc32(f"{name} {index}".encode()) % ONE_IN == 0:
+        if (
+            name.removeprefix("unequal_") in OF_ONE_CALL
+            or zlib.crc32(f"{name} {index}".encode()) % ONE_IN == 0
+        ):
             yield name
 
 
-def residuals(part: str, index: int, case: Any, subject: Subject) -> tuple[dict[str, LawResidual], Run | None]:
-    """Return the residual of each law that judges case `index` of a part, and its run if it is a scene."""
+def residuals(
+    part: str, index: int, case: Any, subject: Subject
+) -> tuple[dict[str, LawResidual], Run | None]:
+    """Return the residual of each law that judges case `index` of a part, and its run if it is a
+    scene."""
     if part in SCENES:
         try:
             run = case.simulate()
@@ -153,7 +194,8 @@ def judge_batch(batch: Batch, subject: Subject) -> Outcome:
 
 
 def summed(outcomes: Iterable[Outcome]) -> tuple[dict[str, dict[str, LawCount]], list[Found]]:
-    """Return the counts of all batches, by part and law, and of each part and law the first case that breaks it."""
+    """Return the counts of all batches, by part and law, and of each part and law the first case
+    that breaks it."""
     counts: dict[str, dict[str, LawCount]] = {}
     found: dict[tuple[str, str], Found] = {}
     for outcome in outcomes:
@@ -179,9 +221,12 @@ def test_{law}():
 
 @one_thread()
 def as_pytest(found: Found, subject: Subject) -> str:
-    """Return a counterexample as source code of a test: an impact shrunk, in numbers; another case drawn again."""
+    """Return a counterexample as source code of a test: an impact shrunk, in numbers; another case
+    drawn again."""
     if found.part not in (IMPACTS, UNEQUAL):
-        return _DRAWN_AGAIN.format(law=found.law, part=found.part, index=found.index, seed=subject.seed)
+        return _DRAWN_AGAIN.format(
+            law=found.law, part=found.part, index=found.index, seed=subject.seed
+        )
 
     def breaks(case: ImpactCase) -> bool:
         residual = _residual(found.law, case, subject)

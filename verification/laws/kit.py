@@ -1,5 +1,5 @@
-"""`check_passivity(resolver)` tests whether an impact resolver ever creates energy and whether it keeps the other laws.
-"""
+"""`check_passivity(resolver)` tests whether an impact resolver ever creates energy and whether it
+keeps the other laws."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ from verification.laws.equality import OF_ONE_CALL, UNEQUAL_LAWS
 from verification.laws.resolver import Resolver, ResolverFault, Watched, own_answer
 from verification.laws.strategies import search_counterexample
 
-NOTABLE = 1e-6  # the search prefers counterexamples with a residual above this, which rounding cannot explain
+# the search prefers counterexamples with a residual above this, which rounding cannot explain
+NOTABLE = 1e-6
 SINGLE = 3  # broken laws from which an answer in single precision is named as the probable cause
 IMPACTS = 5000  # default: about a minute for a resolver that takes 50 µs per call
 PATIENCE = 600.0  # [s] ten times as long
@@ -44,12 +45,14 @@ class LawVerdict(LawCount):
     Attributes
     ----------
     checked, failures : impacts the law applied to, and those that broke it.
-    severe : number of failures that are larger than rounding; equal to `failures` except for ``exact_energy``.
+    severe : number of failures that are larger than rounding; equal to `failures` except for
+        ``exact_energy``.
     worst : the residual with the largest value / tolerance (None if the law never applied).
     largest : largest value of the residual, whatever its tolerance.
-    largest_case : the impact that breaks the law with the largest residual; None if no impact breaks it.
-    smallest_case : the impact with the fewest coordinates and contacts that breaks the law; impacts with a residual of
-        1e-6 or more take precedence.
+    largest_case : the impact that breaks the law with the largest residual; None if no impact
+        breaks it.
+    smallest_case : the impact with the fewest coordinates and contacts that breaks the law; impacts
+        with a residual of 1e-6 or more take precedence.
     fault : first message if the resolver raised an exception or returned an unusable value.
     error : exception that the law itself raised, after which it was not tried again; else None.
     """
@@ -63,7 +66,9 @@ class LawVerdict(LawCount):
     severe: int = 0
     smallest_case: ImpactCase | None = None
     _largest_failure: float = field(default=-np.inf, repr=False)
-    _smallest: tuple[bool, int] = field(default=(True, 0), repr=False)  # whether it is below NOTABLE, and its size
+    _smallest: tuple[bool, int] = field(
+        default=(True, 0), repr=False
+    )  # whether it is below NOTABLE, and its size
 
     @property
     def passed(self) -> bool:
@@ -106,14 +111,17 @@ class LawVerdict(LawCount):
 
 @dataclass(frozen=True, eq=False)
 class PassivityReport(str):
-    """Report of `check_passivity`. It is a string with its own text, because pytest shortens other assert messages.
+    """Report of `check_passivity`. It is a string with its own text, because pytest shortens other
+    assert messages.
 
     Attributes
     ----------
     impacts : number of random impacts tried, not counting the contract's fixed first ones.
     unfinished : why fewer impacts were tried than requested; empty if all were tried.
-    counterexample, counterexample_law : smallest counterexample found, for the first broken law; None if there is none.
-    returned : (d,) v⁺ that the resolver gave for the counterexample, or a text that says why its answer is unusable.
+    counterexample, counterexample_law : smallest counterexample found, for the first broken law;
+        None if there is none.
+    returned : (d,) v⁺ that the resolver gave for the counterexample, or a text that says why its
+        answer is unusable.
     contract : contract that the resolver was tested against; see `verification.laws.contracts`.
     tested : the resolver, for the import line of the generated test.
     """
@@ -162,7 +170,8 @@ class PassivityReport(str):
         return next(verdict for verdict in self.verdicts if verdict.law == law)
 
     def raise_if_broken(self) -> None:
-        """Raise the report as an error unless it passed; the message contains M, J, v, e and the returned velocity.
+        """Raise the report as an error unless it passed; the message contains M, J, v, e and the
+        returned velocity.
 
         Raises
         ------
@@ -177,7 +186,9 @@ class PassivityReport(str):
         """The counterexample as source code of a test, or an empty text if there is none."""
         if self.counterexample is None:
             return ""
-        return as_test(self.counterexample, self.counterexample_law, self.bounds, self.tested, self.contract)
+        return as_test(
+            self.counterexample, self.counterexample_law, self.bounds, self.tested, self.contract
+        )
 
     def _text(self) -> str:
         word = "passed" if self.passed else "NOT FINISHED" if not self.broken_laws else "FAILED"
@@ -191,10 +202,16 @@ class PassivityReport(str):
         worst = self.worst
         if worst.worst is not None and worst.worst_case is not None:
             family = worst.worst_case.family or "an impact"
-            lines.append(f"  worst case: {worst.law} at {worst.worst.ratio:.2g} of its tolerance, {family}")
+            lines.append(
+                f"  worst case: {worst.law} at {worst.worst.ratio:.2g} of its tolerance, {family}"
+            )
         lines += [f"  hint: {hint}" for hint in self._hints()]
         if self.counterexample is not None:
-            lines += ["", f"counterexample to {self.counterexample_law}:", *_shown(self.counterexample, self.returned)]
+            lines += [
+                "",
+                f"counterexample to {self.counterexample_law}:",
+                *_shown(self.counterexample, self.returned),
+            ]
             lines += ["", "as a test:", "", self.counterexample_test]
         return "\n".join(lines)
 
@@ -202,27 +219,48 @@ class PassivityReport(str):
         """Yield probable causes of failures that are no fault of the resolver's law."""
         answer, case, broken = self.returned, self.counterexample, self.broken_laws
         with np.errstate(over="ignore"):
-            single = not isinstance(answer, str) and np.array_equal(np.asarray(answer, np.float32), answer)
+            single = not isinstance(answer, str) and np.array_equal(
+                np.asarray(answer, np.float32), answer
+            )
         if len(broken) >= SINGLE and single:
-            yield ("the resolver seems to compute in single precision, the tolerances are for double precision. Widen "
-                   "them: bounds=dataclasses.replace(verification.laws.bounds.KIT, least=1e-4, restitution=1e-4), "
-                   "largest_condition=100")
-        if "kinetic_energy" in broken[:1] and case and case.friction is not None and case.restitution > 0.0:
-            yield ("with e > 0, Coulomb's friction and Newton's restitution together can gain energy, whatever the "
-                   "solver (Kane and Levinson 1985). `laws` can leave kinetic_energy out")
+            yield (
+                "the resolver seems to compute in single precision, the tolerances are for double "
+                "precision. Widen "
+                "them: bounds=dataclasses.replace(verification.laws.bounds.KIT, least=1e-4, "
+                "restitution=1e-4), "
+                "largest_condition=100"
+            )
+        if (
+            "kinetic_energy" in broken[:1]
+            and case
+            and case.friction is not None
+            and case.restitution > 0.0
+        ):
+            yield (
+                "with e > 0, Coulomb's friction and Newton's restitution together can gain "
+                "energy, whatever the "
+                "solver (Kane and Levinson 1985). `laws` can leave kinetic_energy out"
+            )
 
 
 def _shown(case: ImpactCase, returned: Floats | str) -> Iterator[str]:
     """Yield lines with every argument of the case and with the returned value."""
     names = ("M", "J", "v", "e") if case.tangents is None else ("M", "J", "T", "v", "e", "μ")
     for name, value in (*zip(names, case.given(), strict=True), ("returned", returned)):
-        text = value if isinstance(value, str) else np.array2string(np.asarray(value), precision=9, threshold=400)
+        text = (
+            value
+            if isinstance(value, str)
+            else np.array2string(np.asarray(value), precision=9, threshold=400)
+        )
         lead = f"  {name} = "
         yield lead + text.replace("\n", "\n" + " " * len(lead))
 
 
-def residual_of(law: Law, case: ImpactCase, resolver: Resolver, bounds: Bounds) -> tuple[LawResidual | None, str]:
-    """Return the law's residual and ""; if the answer is unusable, an infinite residual and the resolver's fault."""
+def residual_of(
+    law: Law, case: ImpactCase, resolver: Resolver, bounds: Bounds
+) -> tuple[LawResidual | None, str]:
+    """Return the law's residual and ""; if the answer is unusable, an infinite residual and the
+    resolver's fault."""
     try:
         return law.check(case, resolver, bounds), ""
     except ResolverFault as fault:
@@ -248,43 +286,50 @@ def check_passivity(
 
     Parameters
     ----------
-    resolver : called as resolver(mass_matrix (d, d), contact_jacobian (c, d), velocity (d,), restitution) with
-        float64 arrays (copies; c = 0 included) and one e for all rows; returns v⁺ as an array, a list of numbers, or an
-        object with `.velocity`.
-    contract : ``equality``: every row is an equality, e in [−1, 1]. ``unilateral``: contacts only push, e in [0, 1].
-        ``frictional``: also Coulomb's friction; called as resolver(mass_matrix, contact_jacobian, tangents (c, m, d),
-        velocity, restitution, friction (c,)), m = 1 or 2. Equations and sources: `verification.laws.contracts`.
-    laws : names of the laws to try, such as ["kinetic_energy"]; default: all of the contract except ``exact_energy``,
-        which allows no rounding error.
-    impacts : number of random impacts. ``equality``: up to 10 coordinates and 21 contacts; one impact in ten has up to
-        40 coordinates and 500 contacts, and fewer laws check it. Half of the impacts use other units: M, J and v are
-        multiplied by powers of two from 1e-8 to 1e8. `impacts.ADVERSE` elastic impacts on nearly equal rows come first,
-        in addition. Other contracts: up to 6 coordinates and 6 contacts, no nearly dependent rows.
+    resolver : called as resolver(mass_matrix (d, d), contact_jacobian (c, d), velocity (d,),
+        restitution) with float64 arrays (copies; c = 0 included) and one e for all rows; returns v⁺
+        as an array, a list of numbers, or an object with `.velocity`.
+    contract : ``equality``: every row is an equality, e in [−1, 1]. ``unilateral``: contacts only
+        push, e in [0, 1]. ``frictional``: also Coulomb's friction; called as resolver(mass_matrix,
+        contact_jacobian, tangents (c, m, d), velocity, restitution, friction (c,)), m = 1 or 2.
+        Equations and sources: `verification.laws.contracts`.
+    laws : names of the laws to try, such as ["kinetic_energy"]; default: all of the contract except
+        ``exact_energy``, which allows no rounding error.
+    impacts : number of random impacts. ``equality``: up to 10 coordinates and 21 contacts; one
+        impact in ten has up to 40 coordinates and 500 contacts, and fewer laws check it. Half of
+        the impacts use other units: M, J and v are multiplied by powers of two from 1e-8 to 1e8.
+        `impacts.ADVERSE` elastic impacts on nearly equal rows come first, in addition. Other
+        contracts: up to 6 coordinates and 6 contacts, no nearly dependent rows.
     seed : seed of the random numbers; the same seed gives the same impacts.
-    search : number of examples that hypothesis may try to find and shrink a counterexample (0 = shrink a drawn one).
+    search : number of examples that hypothesis may try to find and shrink a counterexample (0 =
+        shrink a drawn one).
     bounds : tolerances; default: those of the contract, from `verification.laws.bounds`.
-    largest_condition : largest κ(M) drawn; default: 1e8 (``equality``), 1e4 (``unilateral``), 1e2 (``frictional``).
-    unequal_restitution : also call the resolver with an array (c,) of restitutions in [0, 1], one per row, and test
-        the laws that hold for every such rule: no energy gain, M(v⁺ − v⁻) in range(Jᵀ), momentum, repeatable bits,
-        unchanged arguments.
-    patience : time limit [s] after which no further impact is tried; the report then fails and says why.
+    largest_condition : largest κ(M) drawn; default: 1e8 (``equality``), 1e4 (``unilateral``), 1e2
+        (``frictional``).
+    unequal_restitution : also call the resolver with an array (c,) of restitutions in [0, 1], one
+        per row, and test the laws that hold for every such rule: no energy gain, M(v⁺ − v⁻) in
+        range(Jᵀ), momentum, repeatable bits, unchanged arguments.
+    patience : time limit [s] after which no further impact is tried; the report then fails and says
+        why.
     progress : called with (impacts done, impacts) after each impact.
 
     Returns
     -------
     PassivityReport
-        `passed`, each law with its worst case, and the smallest counterexample found, also as a test to paste.
+        `passed`, each law with its worst case, and the smallest counterexample found, also as a
+        test to paste.
 
     Raises
     ------
     ArgumentError
-        No impacts, an unknown contract or law, unequal restitution with friction, or a resolver that cannot be called
-        with these arguments.
+        No impacts, an unknown contract or law, unequal restitution with friction, or a resolver
+        that cannot be called with these arguments.
 
     Notes
     -----
-    The kit finds a fault that n independent draws meet with probability p each with probability 1 − (1 − p)ⁿ.
-    `docs/resolvers.md` lists n, which depends on what the fault depends on, and the faults that the kit cannot see.
+    The kit finds a fault that n independent draws meet with probability p each with probability 1 −
+    (1 − p)ⁿ. `docs/resolvers.md` lists n, which depends on what the fault depends on, and the
+    faults that the kit cannot see.
 
     Examples
     --------
@@ -299,37 +344,71 @@ def check_passivity(
     terms = CONTRACTS[contract]
     bounds = terms.bounds if bounds is None else bounds
     condition = terms.largest_condition if largest_condition is None else largest_condition
-    trial = _Trial(resolver, bounds, terms, int(impacts), seed, condition, chosen,
-                   {name: LawVerdict(name, statement=law.statement) for name, law in chosen.items()})
+    trial = _Trial(
+        resolver,
+        bounds,
+        terms,
+        int(impacts),
+        seed,
+        condition,
+        chosen,
+        {name: LawVerdict(name, statement=law.statement) for name, law in chosen.items()},
+    )
     with one_thread():
         done = _try_all(trial, ends, progress)
         verdicts = tuple(trial.verdicts.values())
         broken = next((verdict for verdict in verdicts if not verdict.passed), None)
-        example = None if broken is None else _counterexample(
-            chosen[broken.law], broken, resolver, bounds, search, seed, ends, contract)
+        example = (
+            None
+            if broken is None
+            else _counterexample(
+                chosen[broken.law], broken, resolver, bounds, search, seed, ends, contract
+            )
+        )
         returned = "" if example is None else own_answer(resolver, example)[0]
     late = "" if done == impacts else f"too slow: {done} of {impacts} impacts in {patience:g} s"
     law = broken.law if broken else ""
-    return PassivityReport(name_of(resolver), done, seed, verdicts, example, law, late, bounds, resolver, contract,
-                           str(returned) if isinstance(returned, ResolverFault) else returned)
+    return PassivityReport(
+        name_of(resolver),
+        done,
+        seed,
+        verdicts,
+        example,
+        law,
+        late,
+        bounds,
+        resolver,
+        contract,
+        str(returned) if isinstance(returned, ResolverFault) else returned,
+    )
 
 
 def _refuse_signature(resolver: Resolver, contract: str) -> None:
     """Raise ArgumentError if the resolver cannot be called with the arguments of the contract."""
     friction = contract == "frictional"
-    wanted = ("mass_matrix", "contact_jacobian", *["tangents"] * friction, "velocity", "restitution",
-              *["friction"] * friction)
+    wanted = (
+        "mass_matrix",
+        "contact_jacobian",
+        *["tangents"] * friction,
+        "velocity",
+        "restitution",
+        *["friction"] * friction,
+    )
     try:
         signature(resolver).bind(*wanted)
     except TypeError as error:
-        raise ArgumentError("resolver", name_of(resolver), f"a function called as ({', '.join(wanted)}): {error}"
-                            ) from None
+        raise ArgumentError(
+            "resolver", name_of(resolver), f"a function called as ({', '.join(wanted)}): {error}"
+        ) from None
     except ValueError:  # a compiled function may have no signature
         return
 
 
-def choose_laws(contract: str, laws: Sequence[str] | None, unequal_restitution: bool = False) -> dict[str, Law]:
-    """Return the laws of a contract by name: those in `laws`, or all but the optional ones if `laws` is None.
+def choose_laws(
+    contract: str, laws: Sequence[str] | None, unequal_restitution: bool = False
+) -> dict[str, Law]:
+    """Return the laws of a contract by name: those in `laws`, or all but the optional ones if
+    `laws` is None.
 
     Raises
     ------
@@ -368,27 +447,36 @@ class _Trial(NamedTuple):
 
 
 def _try_all(trial: _Trial, ends: float, progress: Callable[[int, int], None] | None) -> int:
-    """Check every impact against its laws; return the number of random impacts tried within the time limit."""
+    """Check every impact against its laws; return the number of random impacts tried within the
+    time limit."""
     watched, rng = Watched(trial.resolver), np.random.default_rng([trial.seed, 3])
     for done, case, mixed in _drawn(trial):
         large = case.coordinates >= LARGE_COORDINATES[0] or case.contacts >= LARGE_CONTACTS[0]
         for k, name in enumerate(trial.laws):
             # of the laws that need more than one call, a large impact is checked by one in turn
-            if (large and name.removeprefix("unequal_") not in OF_ONE_CALL
-                    and (done // LARGE_EVERY - k) % len(trial.laws)):
+            if (
+                large
+                and name.removeprefix("unequal_") not in OF_ONE_CALL
+                and (done // LARGE_EVERY - k) % len(trial.laws)
+            ):
                 continue
             if time.monotonic() > ends:
                 return max(0, done - 1)
             own = mixed if name in UNEQUAL_LAWS else case
-            # every second law with variants takes an impact of its own: a band of e, μ or κ is met several times
+            # every second law with variants takes an impact of its own: a band of e, μ or κ is met
+            # several times
             if name in OF_VARIANTS and (done + k) % 2 and not large:
                 number = int(rng.integers(1 << 30))
                 number += number % LARGE_EVERY == LARGE_EVERY // 2  # no large impact
-                own = replace(trial.contract.draw(rng, number, trial.largest_condition),
-                              restitution=float(rng.uniform(trial.contract.least_restitution, 1.0)))
+                own = replace(
+                    trial.contract.draw(rng, number, trial.largest_condition),
+                    restitution=float(rng.uniform(trial.contract.least_restitution, 1.0)),
+                )
                 for single in OF_ONE_CALL:
                     if single in trial.laws:
-                        trial.verdicts[single].try_on(trial.laws[single], own, watched, trial.bounds)
+                        trial.verdicts[single].try_on(
+                            trial.laws[single], own, watched, trial.bounds
+                        )
             trial.verdicts[name].try_on(trial.laws[name], own, watched, trial.bounds)
         for suspect, v_plus in watched.suspects:
             if suspect is not case and suspect is not mixed:  # judged by their own laws
@@ -400,7 +488,8 @@ def _try_all(trial: _Trial, ends: float, progress: Callable[[int, int], None] | 
 
 
 def _judge_energy(trial: _Trial, case: ImpactCase, v_plus: Any) -> None:
-    """Check the energy of an answer that another law got for a variant of an impact, without another call."""
+    """Check the energy of an answer that another law got for a variant of an impact, without
+    another call."""
     own = replace(case, family=f"{case.family}, a variant of it that another law tried")
     own._answers[id(trial.resolver)] = trial.resolver, (v_plus, 0)
     name = "kinetic_energy" if case.unequal is None else "unequal_kinetic_energy"
@@ -409,8 +498,9 @@ def _judge_energy(trial: _Trial, case: ImpactCase, v_plus: Any) -> None:
 
 
 def _drawn(trial: _Trial) -> Iterator[tuple[int, ImpactCase, ImpactCase]]:
-    """Yield (number, impact, variant with unequal restitutions): the contract's fixed impacts have number 0, the random
-    ones count from 1. Without a law of unequal restitution the variant is the impact itself.
+    """Yield (number, impact, variant with unequal restitutions): the contract's fixed impacts have
+    number 0, the random ones count from 1. Without a law of unequal restitution the variant is the
+    impact itself.
     """
     unequal, seed = any(name in UNEQUAL_LAWS for name in trial.laws), trial.seed
     rng, other, adverse = (np.random.default_rng(own) for own in (seed, [seed, 1], [seed, 2]))
@@ -422,9 +512,17 @@ def _drawn(trial: _Trial) -> Iterator[tuple[int, ImpactCase, ImpactCase]]:
 
 
 def _counterexample(
-    law: Law, broken: LawVerdict, resolver: Resolver, bounds: Bounds, search: int, seed: int, ends: float, contract: str
+    law: Law,
+    broken: LawVerdict,
+    resolver: Resolver,
+    bounds: Bounds,
+    search: int,
+    seed: int,
+    ends: float,
+    contract: str,
 ) -> ImpactCase | None:
-    """Return the smallest counterexample that hypothesis or the drawn impacts give, shrunk until the time limit."""
+    """Return the smallest counterexample that hypothesis or the drawn impacts give, shrunk until
+    the time limit."""
 
     def breaks(case: ImpactCase, least: float) -> bool:
         if time.monotonic() > ends:
@@ -435,8 +533,16 @@ def _counterexample(
     kind = "unequal" if broken.law in UNEQUAL_LAWS else contract
     for least in (NOTABLE, 0.0):
         fails = partial(breaks, least=least)
-        found = search_counterexample(fails, search, seed, kind) if search and time.monotonic() < ends else None
-        drawn = [case for case in (broken.smallest_case, broken.largest_case) if case is not None and fails(case)]
+        found = (
+            search_counterexample(fails, search, seed, kind)
+            if search and time.monotonic() < ends
+            else None
+        )
+        drawn = [
+            case
+            for case in (broken.smallest_case, broken.largest_case)
+            if case is not None and fails(case)
+        ]
         if failing := drawn if found is None else [found, *drawn]:
             return shrink(min(failing, key=lambda case: case.coordinates + case.contacts), fails)
     return None

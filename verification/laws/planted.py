@@ -1,5 +1,5 @@
-"""One planted fault for each law: a faulty resolver, a faulty subject of `engine`, or a faulty run. Each law must
-detect its fault; other laws may detect it, too.
+"""One planted fault for each law: a faulty resolver, a faulty subject of `engine`, or a faulty run.
+Each law must detect its fault; other laws may detect it, too.
 """
 
 from __future__ import annotations
@@ -14,14 +14,22 @@ from iapb.run import Run
 from iapb.system import System
 from verification.impacts import Floats, ImpactCase
 from verification.laws.engine import Wall, saturated
-from verification.laws.resolver import RANK_CUT, Resolver, projecting, row_space, sound_resolver, whitened
+from verification.laws.resolver import (
+    RANK_CUT,
+    Resolver,
+    projecting,
+    row_space,
+    sound_resolver,
+    whitened,
+)
 from verification.laws.scenes import SceneCase
 from verification.laws.trajectories import TRAJECTORY_LAWS, Trajectory
 from verification.stability.device_port import DeviceLoop, actuator_forces
 
 
 class Fault(NamedTuple):
-    """A fault: its name, and its resolver or subject, or what makes one with a memory of its own."""
+    """A fault: its name, and its resolver or subject, or what makes one with a memory of its
+    own."""
 
     name: str
     subject: Callable[..., Any]
@@ -46,7 +54,8 @@ def transposed_factor(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
 
 
 def per_body_rows(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """(13)-(14): reverses the two bodies of a self-collision separately (here: positive and negative entries)."""
+    """(13)-(14): reverses the two bodies of a self-collision separately (here: positive and
+    negative entries)."""
     return sound_resolver(M, np.vstack([np.maximum(J, 0.0), np.minimum(J, 0.0)]), v, e)
 
 
@@ -104,7 +113,8 @@ def writes_on_its_arguments(M: Floats, J: Floats, v: Floats, e: float) -> Floats
 
 @whitened
 def each_contact_its_own_restitution(A: Floats, u: Floats, e: Floats) -> Floats:
-    """Newton's law as equalities with a restitution per row: every row meets it, but it can create energy."""
+    """Newton's law as equalities with a restitution per row: every row meets it, but it can create
+    energy."""
     if np.ndim(e) == 0:
         Q = row_space(A)
         return u - (1.0 + e) * (Q.T @ (Q @ u))
@@ -113,22 +123,34 @@ def each_contact_its_own_restitution(A: Floats, u: Floats, e: Floats) -> Floats:
 
 PLANTED_BUGS: dict[str, Fault] = {
     "kinetic_energy": Fault("wrong_sign", wrong_sign),
-    "restitution": Fault("squared_restitution", lambda M, J, v, e: projecting(M, J, v, 1.0 + e * e)),
-    "free_motion": Fault("too_tight_rank", lambda M, J, v, e: projecting(M, J, v, 1.0 + e, cut=1e-18)),
+    "restitution": Fault(
+        "squared_restitution", lambda M, J, v, e: projecting(M, J, v, 1.0 + e * e)
+    ),
+    "free_motion": Fault(
+        "too_tight_rank", lambda M, J, v, e: projecting(M, J, v, 1.0 + e, cut=1e-18)
+    ),
     "impulse_range": Fault("transposed_factor", transposed_factor),
     # ignores the coupling between coordinates in M
-    "coordinates": Fault("diagonal_mass", lambda M, J, v, e: projecting(np.diag(np.diag(M)), J, v, 1.0 + e)),
+    "coordinates": Fault(
+        "diagonal_mass", lambda M, J, v, e: projecting(np.diag(np.diag(M)), J, v, 1.0 + e)
+    ),
     "row_order": Fault("one_after_the_other", one_after_the_other),
     "duplicated_rows": Fault("double_counted", double_counted),
     "momentum": Fault("per_body_rows", per_body_rows),
     "row_scaling": Fault("unscaled_rows", unscaled_rows),
-    "no_impulse": Fault("absolute_restitution", lambda M, J, v, e: projecting(M, J, v, 1.0 + abs(e))),
+    "no_impulse": Fault(
+        "absolute_restitution", lambda M, J, v, e: projecting(M, J, v, 1.0 + abs(e))
+    ),
     # 1e-4 less of the impulse than e requires
-    "elastic": Fault("nearly_elastic", lambda M, J, v, e: projecting(M, J, v, (1.0 + e) * (1.0 - 1e-4))),
+    "elastic": Fault(
+        "nearly_elastic", lambda M, J, v, e: projecting(M, J, v, (1.0 + e) * (1.0 - 1e-4))
+    ),
     "redundancy": Fault("one_gradient_step", one_gradient_step),
     # a fixed length depends on the units
-    "units": Fault("short_rows_dropped",
-                   lambda M, J, v, e: sound_resolver(M, J[np.linalg.norm(J, axis=1) > 0.2], v, e)),
+    "units": Fault(
+        "short_rows_dropped",
+        lambda M, J, v, e: sound_resolver(M, J[np.linalg.norm(J, axis=1) > 0.2], v, e),
+    ),
     "groups": Fault("three_rows_at_most", three_rows_at_most),
     "repeatability": Fault("warm_start", makes_warm_start, remembers=True),
     "arguments": Fault("writes_on_its_arguments", writes_on_its_arguments),
@@ -137,7 +159,8 @@ PLANTED_BUGS: dict[str, Fault] = {
 
 # Faulty subjects of the laws of `engine`.
 def not_orthogonal(M: Floats, J: Floats, v: Floats, e: float, budget: int) -> Floats:
-    """Uses the first rows, each with the impulse that it would need alone; exact for one row only."""
+    """Uses the first rows, each with the impulse that it would need alone; exact for one row
+    only."""
     return double_counted(M, J[:budget], v, e)
 
 
@@ -175,8 +198,8 @@ PLANTED_ENGINE_FAULTS: dict[str, Fault] = {
 }
 
 
-# Runs that were simulated or recorded wrongly: a fault takes a scene and returns such a run, or None if it has no
-# effect in the scene.
+# Runs that were simulated or recorded wrongly: a fault takes a scene and returns such a run, or
+# None if it has no effect in the scene.
 def not_a_number(case: SceneCase) -> Run:
     """Sets one velocity of the last state to NaN."""
     run = case.simulate()
@@ -206,7 +229,9 @@ def lost_gravity(case: SceneCase) -> Run | None:
     """Simulates a scene with gravity as if it had none."""
     if not case.values.get("gravity"):
         return None
-    weightless = replace(case, values={key: value for key, value in case.values.items() if key != "gravity"})
+    weightless = replace(
+        case, values={key: value for key, value in case.values.items() if key != "gravity"}
+    )
     return replace(weightless.simulate(), scene_source=case.scene().source_text)
 
 
@@ -247,11 +272,16 @@ def unclamped_friction(case: SceneCase) -> Run | None:
     contacts, mu = run.contacts, run.scene_resolved["contact"]["friction"]
     length = np.linalg.norm(contacts.friction_force, axis=1)
     slides = np.any((length > 0.0) & (length > 0.9 * mu * contacts.normal_force))
-    return replace(run, contacts=replace(contacts, friction_force=1.5 * contacts.friction_force)) if slides else None
+    return (
+        replace(run, contacts=replace(contacts, friction_force=1.5 * contacts.friction_force))
+        if slides
+        else None
+    )
 
 
 def overdriven_friction(case: SceneCase) -> Run | None:
-    """Simulates (6) instead of Coulomb's law; for its threshold velocity the step is too long, so it drives bodies."""
+    """Simulates (6) instead of Coulomb's law; for its threshold velocity the step is too long, so
+    it drives bodies."""
     contact = case.values["contact"]
     if not contact.get("friction") or contact["forces"] == "paper":
         return None
@@ -266,7 +296,11 @@ def device_beyond_its_limits(case: SceneCase) -> Run | None:
         return None
     run = replace(case, rendering="full").simulate()
     beyond = bool(np.any(np.abs(run.device_force) > np.array(limit)))
-    return replace(run, law_settings=run.law_settings | {"rendering": case.rendering}) if beyond else None
+    return (
+        replace(run, law_settings=run.law_settings | {"rendering": case.rendering})
+        if beyond
+        else None
+    )
 
 
 PLANTED_TRAJECTORY_FAULTS: dict[str, Callable[[SceneCase], Run | None]] = {
@@ -284,7 +318,8 @@ PLANTED_TRAJECTORY_FAULTS: dict[str, Callable[[SceneCase], Run | None]] = {
 
 
 def first_occasion(law: str, scenes: list[SceneCase]) -> Run | None:
-    """Return the run with the law's fault in the first scene to which the law applies and the fault makes a difference.
+    """Return the run with the law's fault in the first scene to which the law applies and the fault
+    makes a difference.
 
     None if there is no such scene.
     """

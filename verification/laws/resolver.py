@@ -1,4 +1,5 @@
-"""Calls of any resolver with checks of its answer, and a correct resolver in plain numpy, independent of the engine."""
+"""Calls of any resolver with checks of its answer, and a correct resolver in plain numpy,
+independent of the engine."""
 
 from __future__ import annotations
 
@@ -12,7 +13,8 @@ from iapb.errors import IapbError
 from verification.impacts import Floats, ImpactCase
 
 Resolver = Callable[..., Any]  # called with `ImpactCase.given()`
-SUSPICIOUS = 1e-9  # relative gain in plain doubles; for κ(M) well above 1e4 the kit's bounds allow more than this
+# relative gain in plain doubles; for κ(M) well above 1e4 the kit's bounds allow more than this
+SUSPICIOUS = 1e-9
 
 
 class ResolverFault(IapbError):
@@ -22,7 +24,8 @@ class ResolverFault(IapbError):
 class Watched:
     """A resolver whose every answer is checked for energy, whichever law made the call.
 
-    suspects : (case, v⁺) of answers that seem to gain energy in plain doubles; the kit checks them in double-double.
+    suspects : (case, v⁺) of answers that seem to gain energy in plain doubles; the kit checks them
+        in double-double.
     """
 
     def __init__(self, resolver: Resolver) -> None:
@@ -33,7 +36,8 @@ class Watched:
         return self.resolver(*given)
 
     def look_at(self, case: ImpactCase, v_plus: Floats) -> None:
-        """Add the answer to `suspects` if its kinetic energy exceeds that before the impact by more than SUSPICIOUS."""
+        """Add the answer to `suspects` if its kinetic energy exceeds that before the impact by more
+        than SUSPICIOUS."""
         before = float(case.velocity @ (case.mass_matrix @ case.velocity))
         after = float(v_plus @ (case.mass_matrix @ v_plus))
         if not after <= before * (1.0 + SUSPICIOUS):
@@ -61,7 +65,8 @@ def own_outcome(resolver: Resolver, case: ImpactCase) -> Floats:
 
 
 def outcome(resolver: Resolver, case: ImpactCase) -> Floats:
-    """Call the resolver on copies of the case's arrays and return v⁺ (d,), checked for shape and finiteness."""
+    """Call the resolver on copies of the case's arrays and return v⁺ (d,), checked for shape and
+    finiteness."""
     return _usable(_velocity(resolver, case.given(), case))
 
 
@@ -71,18 +76,24 @@ def _usable(velocity: Floats | ResolverFault) -> Floats:
     return velocity
 
 
-def _velocity(resolver: Resolver, given: tuple[Any, ...], case: ImpactCase) -> Floats | ResolverFault:
+def _velocity(
+    resolver: Resolver, given: tuple[Any, ...], case: ImpactCase
+) -> Floats | ResolverFault:
     """Return a copy of v⁺, or the fault of a resolver that raises or gives an unusable answer."""
     try:
         answer = resolver(*given)
-    except Exception as error:  # a foreign resolver may raise anything: that is its fault, not an error of the kit
+    except (
+        Exception
+    ) as error:  # a foreign resolver may raise anything: that is its fault, not an error of the kit
         return ResolverFault(f"raised {type(error).__name__}: {error}")
     try:
         velocity = np.asarray(getattr(answer, "velocity", answer))
     except Exception as error:  # as foreign as the resolver
         return ResolverFault(f"returned {type(answer).__name__}, which is no array: {error}")
     if velocity.dtype.kind not in "fiu" or velocity.shape != case.velocity.shape:
-        return ResolverFault(f"returned {velocity.dtype} of shape {velocity.shape}, not float {case.velocity.shape}")
+        return ResolverFault(
+            f"returned {velocity.dtype} of shape {velocity.shape}, not float {case.velocity.shape}"
+        )
     velocity = velocity.astype(np.float64)
     if not np.all(np.isfinite(velocity)):
         return ResolverFault("returned a velocity that is not finite")
@@ -119,15 +130,17 @@ def projecting(A: Floats, u: Floats, factor: float, cut: float = RANK_CUT) -> Fl
 
 
 def sound_resolver(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Return v⁺ from u⁺ = u − (1 + e) Qᵀ Q u, with Q from the singular value decomposition of the unit rows of A."""
+    """Return v⁺ from u⁺ = u − (1 + e) Qᵀ Q u, with Q from the singular value decomposition of the
+    unit rows of A."""
     return projecting(M, J, v, 1.0 + e)
 
 
 def least_push(rows: Floats, target: Floats) -> Floats:
-    """Return the p ≥ 0 (c,) that brings Aᵀp closest to `target` (d,), by the active sets of Lawson and Hanson (1974).
+    """Return the p ≥ 0 (c,) that brings Aᵀp closest to `target` (d,), by the active sets of Lawson
+    and Hanson (1974).
 
-    A row joins the active set only if it reduces the remainder by more than rounding. scipy 1.17's `nnls` has no such
-    threshold: for a p that is 0 up to 1e-17 it returned impulses of 0.1.
+    A row joins the active set only if it reduces the remainder by more than rounding. scipy 1.17's
+    `nnls` has no such threshold: for a p that is 0 up to 1e-17 it returned impulses of 0.1.
     """
     p, used = np.zeros(len(rows)), np.zeros(len(rows), dtype=bool)
     length = np.linalg.norm(rows, axis=1)

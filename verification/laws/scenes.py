@@ -1,7 +1,8 @@
-"""Random scenes: free bodies and short linkages among walls, with random initial states, restitution, stiffness, step.
+"""Random scenes: free bodies and short linkages among walls, with random initial states,
+restitution, stiffness, step.
 
-In spatial scenes, boxes and balls fly in a room of planes, or rest on a plane or on each other. A scene consists of the
-plain values of a scene file, so that it can be stored, shrunk and pasted.
+In spatial scenes, boxes and balls fly in a room of planes, or rest on a plane or on each other. A
+scene consists of the plain values of a scene file, so that it can be stored, shrunk and pasted.
 """
 
 from __future__ import annotations
@@ -20,15 +21,21 @@ from reference.worlds import run_world
 Values = dict[str, Any]
 
 ROOM = 0.5  # [m] half width of the room
-CELLS = tuple((x, y) for x in (-0.27, 0.0, 0.27) for y in (-0.27, 0.0, 0.27))  # at most one body starts in each
+CELLS = tuple(
+    (x, y) for x in (-0.27, 0.0, 0.27) for y in (-0.27, 0.0, 0.27)
+)  # at most one body starts in each
 RENDERINGS = ("full", "full", "saturate", "scale", "spread")
-# With √(K/m)·Δt above this, (5) has less than one sample per quarter of its period and the motion diverges.
+# With √(K/m)·Δt above this, (5) has less than one sample per quarter of its period and the motion
+# diverges.
 STIFFEST = 0.5
 # Spatial scenes: at most one flying body starts in each cell.
-SPATIAL_CELLS = tuple((x, y, z) for x in (-0.25, 0.25) for y in (-0.25, 0.25) for z in (-0.25, 0.25))
+SPATIAL_CELLS = tuple(
+    (x, y, z) for x in (-0.25, 0.25) for y in (-0.25, 0.25) for z in (-0.25, 0.25)
+)
 MIDDLE_CHAIN = 0.45  # share of scenes with a linkage, hung in the middle of the room
 STACK = 0.4  # share of scenes with a box on the floor and a smaller box or a ball on it
-# Up to four points of a face share an impact, and a hit on a corner turns its box: K is limited as for a lighter mass.
+# Up to four points of a face share an impact, and a hit on a corner turns its box: K is limited as
+# for a lighter mass.
 SOFTER = 6.0
 
 
@@ -52,29 +59,58 @@ class SceneCase:
 def draw_scene(rng: np.random.Generator, steps: int = 400) -> SceneCase:
     """Return a random planar scene of `steps` steps, with its world and rendering."""
     bodies = _bodies(rng)
-    return _drawn(rng, steps, {"name": "random_scene"}, (256, 512, 1000, 2000), bodies, _walls, (0.5, [0.0, -9.81]),
-                  min(body["mass"] for body in bodies), ([2.0, 2.0, 0.05], [15.0, 15.0, 1.0], (0.3, 1.0)))
+    return _drawn(
+        rng,
+        steps,
+        {"name": "random_scene"},
+        (256, 512, 1000, 2000),
+        bodies,
+        _walls,
+        (0.5, [0.0, -9.81]),
+        min(body["mass"] for body in bodies),
+        ([2.0, 2.0, 0.05], [15.0, 15.0, 1.0], (0.3, 1.0)),
+    )
 
 
 def draw_spatial_scene(rng: np.random.Generator, steps: int = 400) -> SceneCase:
     """Return a random spatial scene of `steps` steps, with its world and rendering."""
     bodies = _spatial_bodies(rng)
-    return _drawn(rng, steps, {"name": "random_scene_in_space", "dimensions": 3}, (512, 1000, 2000), bodies, _room,
-                  (0.6, [0.0, 0.0, -9.81]), min(body["mass"] for body in bodies) / SOFTER,
-                  ([2.0] * 3 + [0.05] * 3, [15.0] * 3 + [1.0] * 3, (0.0, 0.7)))
+    return _drawn(
+        rng,
+        steps,
+        {"name": "random_scene_in_space", "dimensions": 3},
+        (512, 1000, 2000),
+        bodies,
+        _room,
+        (0.6, [0.0, 0.0, -9.81]),
+        min(body["mass"] for body in bodies) / SOFTER,
+        ([2.0] * 3 + [0.05] * 3, [15.0] * 3 + [1.0] * 3, (0.0, 0.7)),
+    )
 
 
 def _drawn(
-    rng: np.random.Generator, steps: int, head: Values, rates: Sequence[int], bodies: list[Values],
-    walls: Callable[[np.random.Generator], list[Values]], gravity: tuple[float, list[float]], least_mass: float,
+    rng: np.random.Generator,
+    steps: int,
+    head: Values,
+    rates: Sequence[int],
+    bodies: list[Values],
+    walls: Callable[[np.random.Generator], list[Values]],
+    gravity: tuple[float, list[float]],
+    least_mass: float,
     hand: tuple[list[float], list[float], tuple[float, float]],
 ) -> SceneCase:
     """Return a scene of these bodies and draw the rest.
 
     gravity : share of the scenes that have gravity, and its field [m/s²]
-    hand : scale of its force and torque, the limits of its device, and the draws from [0, 1) for which it has a device
+    hand : scale of its force and torque, the limits of its device, and the draws from [0, 1) for
+        which it has a device
     """
-    values: Values = {**head, "rate": float(rng.choice(rates)), "bodies": bodies, "walls": walls(rng)}
+    values: Values = {
+        **head,
+        "rate": float(rng.choice(rates)),
+        "bodies": bodies,
+        "walls": walls(rng),
+    }
     values["duration"], values["integrator"] = steps / values["rate"], "semi_implicit_euler"
     if rng.random() < gravity[0]:
         values["gravity"] = gravity[1]
@@ -99,24 +135,38 @@ def _free_body(rng: np.random.Generator, k: int, cell: tuple[float, float]) -> V
     if rng.random() < 0.5:
         shape = {"kind": "box", "size": [2.0 * size, round(rng.uniform(0.03, 0.12), 4)]}
     return {
-        "name": f"body_{k}", "joint": "planar", "mass": mass, "inertia": round(0.5 * mass * size**2, 9) + 1e-6,
-        "shapes": [shape], "position": [*cell, round(rng.uniform(-3.0, 3.0), 3)],
+        "name": f"body_{k}",
+        "joint": "planar",
+        "mass": mass,
+        "inertia": round(0.5 * mass * size**2, 9) + 1e-6,
+        "shapes": [shape],
+        "position": [*cell, round(rng.uniform(-3.0, 3.0), 3)],
         "velocity": [round(x, 3) for x in rng.normal(scale=[1.0, 1.0, 4.0])],
-    }  # fmt: skip
+    }
 
 
 def _linkage(rng: np.random.Generator, in_space: bool = False) -> list[Values]:
-    """Return a chain of one to three links in the middle of the room; in space the joint axes have any direction, and
-    the first joint is sometimes a ball joint.
+    """Return a chain of one to three links in the middle of the room; in space the joint axes have
+    any direction, and the first joint is sometimes a ball joint.
     """
     links: list[Values] = []
     for k in range(int(rng.integers(1, 4))):
         length, mass, zero = 0.09, round(10.0 ** rng.uniform(-1.0, 0.3), 4), [0.0] * (1 + in_space)
         across = mass * (length**2 + 0.02**2) / 12.0
         link: Values = {
-            "name": f"link_{k}", "mass": mass, "center_of_mass": [length / 2, *zero],
-            "inertia": [mass * 0.02**2 / 6.0, across, across] if in_space else round(mass * length**2 / 12, 9),
-            "shapes": [{"kind": "box", "size": [length, *(0.02 for _ in zero)], "center": [length / 2, *zero]}],
+            "name": f"link_{k}",
+            "mass": mass,
+            "center_of_mass": [length / 2, *zero],
+            "inertia": [mass * 0.02**2 / 6.0, across, across]
+            if in_space
+            else round(mass * length**2 / 12, 9),
+            "shapes": [
+                {
+                    "kind": "box",
+                    "size": [length, *(0.02 for _ in zero)],
+                    "center": [length / 2, *zero],
+                }
+            ],
         } | _joint(rng, in_space, ball=in_space and k == 0 and rng.random() < 0.3)
         links.append(link | ({"parent": f"link_{k - 1}", "origin": [length, *zero]} if k else {}))
     return links
@@ -124,16 +174,28 @@ def _linkage(rng: np.random.Generator, in_space: bool = False) -> list[Values]:
 
 def _joint(rng: np.random.Generator, in_space: bool, ball: bool) -> Values:
     if ball:
-        return {"joint": "spherical", "velocity": [round(float(x), 3) for x in rng.normal(scale=3.0, size=3)]}
+        return {
+            "joint": "spherical",
+            "velocity": [round(float(x), 3) for x in rng.normal(scale=3.0, size=3)],
+        }
     axis = {"axis": [round(float(x), 3) for x in rng.normal(size=3)]} if in_space else {}
-    return {"joint": "revolute", **axis, "position": [round(rng.uniform(-1.5, 1.5), 3)],
-            "velocity": [round(rng.normal(scale=3.0), 3)]}
+    return {
+        "joint": "revolute",
+        **axis,
+        "position": [round(rng.uniform(-1.5, 1.5), 3)],
+        "velocity": [round(rng.normal(scale=3.0), 3)],
+    }
 
 
 def _walls(rng: np.random.Generator) -> list[Values]:
     sides = ((ROOM, 0.0), (-ROOM, 0.0), (0.0, ROOM), (0.0, -ROOM))
     walls: list[Values] = [
-        {"name": f"side_{k}", "kind": "half_plane", "point": [x, y], "normal": [-x / ROOM, -y / ROOM]}
+        {
+            "name": f"side_{k}",
+            "kind": "half_plane",
+            "point": [x, y],
+            "normal": [-x / ROOM, -y / ROOM],
+        }
         for k, (x, y) in enumerate(sides)
     ]
     if rng.random() < 0.4:
@@ -147,12 +209,16 @@ def _contact(rng: np.random.Generator, least_mass: float, dt: float) -> Values:
     stiffness = min(10.0 ** rng.uniform(2.0, 5.0), (STIFFEST / dt) ** 2 * least_mass)
     damping = rng.choice([0.0, 0.3, 1.0]) * np.sqrt(stiffness * least_mass)
     contact: Values = {
-        "forces": "paper", "stiffness": round(stiffness, 3), "damping": round(float(damping), 4),
+        "forces": "paper",
+        "stiffness": round(stiffness, 3),
+        "damping": round(float(damping), 4),
         "restitution": float(rng.choice([0.0, 0.5, 1.0, round(rng.uniform(), 3)])),
-    }  # fmt: skip
+    }
     if rng.random() < 0.4:
         friction = round(rng.uniform(0.05, 1.0), 3)
-        forces = "paper" if round(1e3 * friction) % 3 == 0 else "implicit"  # no draw: all other values stay the same
+        forces = (
+            "paper" if round(1e3 * friction) % 3 == 0 else "implicit"
+        )  # no draw: all other values stay the same
         contact |= {"forces": forces, "friction": friction, "friction_velocity": 1e-2}
     if rng.random() < 0.5:
         contact["coherence_distance"] = 1e-2
@@ -166,18 +232,29 @@ def _contact(rng: np.random.Generator, least_mass: float, dt: float) -> Values:
 
 
 def _add_hand(
-    rng: np.random.Generator, values: Values, scale: list[float], limits: list[float], through: tuple[float, float]
+    rng: np.random.Generator,
+    values: Values,
+    scale: list[float],
+    limits: list[float],
+    through: tuple[float, float],
 ) -> None:
-    """Add a hand on the first free body, usually through a device, perhaps with limits, delay and quantised sensors."""
-    values["hand"] = {"body": "body_0", "force": [round(float(x), 3) for x in rng.normal(scale=scale)]}
+    """Add a hand on the first free body, usually through a device, perhaps with limits, delay and
+    quantised sensors."""
+    values["hand"] = {
+        "body": "body_0",
+        "force": [round(float(x), 3) for x in rng.normal(scale=scale)],
+    }
     if not through[0] <= rng.random() < through[1]:
         return
     body, turning = values["bodies"][0], np.ravel(values["bodies"][0]["inertia"])
     inertia = np.array([body["mass"]] * (len(limits) - len(turning)) + turning.tolist())
     rate = 0.05 * values["rate"]  # of the coupling [1/s]: slow beside the step
-    values["couplings"] = {"four_channel": {
-        "stiffness": [float(f"{x:.6g}") for x in inertia * rate**2 * 0.3],
-        "damping": [float(f"{x:.6g}") for x in inertia * rate]}}  # fmt: skip
+    values["couplings"] = {
+        "four_channel": {
+            "stiffness": [float(f"{x:.6g}") for x in inertia * rate**2 * 0.3],
+            "damping": [float(f"{x:.6g}") for x in inertia * rate],
+        }
+    }
     device: Values = {}
     if rng.random() < 0.7:
         device["force_limit"] = limits
@@ -190,8 +267,15 @@ def _add_hand(
 
 def _room(_: np.random.Generator) -> list[Values]:
     sides = [sign * ROOM * axis for axis in np.eye(3) for sign in (1.0, -1.0)]
-    return [{"name": f"side_{k}", "kind": "half_space", "point": side.tolist(), "normal": (-side / ROOM).tolist()}
-            for k, side in enumerate(sides)]  # fmt: skip
+    return [
+        {
+            "name": f"side_{k}",
+            "kind": "half_space",
+            "point": side.tolist(),
+            "normal": (-side / ROOM).tolist(),
+        }
+        for k, side in enumerate(sides)
+    ]
 
 
 def _spatial_bodies(rng: np.random.Generator) -> list[Values]:
@@ -207,27 +291,41 @@ def _flying(rng: np.random.Generator, k: int, cell: tuple[float, float, float]) 
     turn = rng.normal(size=4)
     body = _box_or_ball(rng, f"body_{k}", rng.uniform(0.03, 0.08), rng.random() < 0.5)
     speed = rng.normal(scale=[1.0, 1.0, 1.0, 4.0, 4.0, 4.0])
-    return body | {"position": [*cell, *(turn / np.linalg.norm(turn)).tolist()],
-                   "velocity": [round(float(x), 3) for x in speed]}  # fmt: skip
+    return body | {
+        "position": [*cell, *(turn / np.linalg.norm(turn)).tolist()],
+        "velocity": [round(float(x), 3) for x in speed],
+    }
 
 
 def _box_or_ball(rng: np.random.Generator, name: str, size: float, ball: bool) -> Values:
-    """Return a uniform ball of radius `size`, or a uniform box with sides up to twice `size` [m]."""
+    """Return a uniform ball of radius `size`, or a uniform box with sides up to twice `size`
+    [m]."""
     mass = round(10.0 ** rng.uniform(-1.5, 0.7), 4)
     sides = np.array([round(2.0 * size * rng.uniform(0.4, 1.0), 4) for _ in range(3)])
     squares = sides**2
     inertia = np.full(3, 0.4 * mass * size**2) if ball else mass / 12.0 * (squares.sum() - squares)
-    shape: Values = {"kind": "sphere", "radius": size} if ball else {"kind": "box", "size": sides.tolist()}
-    return {"name": name, "joint": "free_flyer", "mass": mass, "inertia": inertia.tolist(), "shapes": [shape]}
+    shape: Values = (
+        {"kind": "sphere", "radius": size} if ball else {"kind": "box", "size": sides.tolist()}
+    )
+    return {
+        "name": name,
+        "joint": "free_flyer",
+        "mass": mass,
+        "inertia": inertia.tolist(),
+        "shapes": [shape],
+    }
 
 
 def _stack(rng: np.random.Generator) -> list[Values]:
-    """Return a box at rest in the middle of the floor, and a box or a ball on it; each contact penetrates by 1 µm."""
+    """Return a box at rest in the middle of the floor, and a box or a ball on it; each contact
+    penetrates by 1 µm."""
     below = _box_or_ball(rng, "below", 0.08, ball=False)
     above = _box_or_ball(rng, "above", 0.04, ball=rng.random() < 0.5)
     height = below["shapes"][0]["size"][2]
     shape = above["shapes"][0]
     half = shape["radius"] if shape["kind"] == "sphere" else 0.5 * shape["size"][2]
     low, high = -ROOM + 0.5 * height - 1e-6, -ROOM + height + half - 2e-6
-    return [below | {"position": [0.0, 0.0, low, 0.0, 0.0, 0.0, 1.0]},
-            above | {"position": [0.003, -0.002, high, 0.0, 0.0, 0.0, 1.0]}]  # fmt: skip
+    return [
+        below | {"position": [0.0, 0.0, low, 0.0, 0.0, 0.0, 1.0]},
+        above | {"position": [0.003, -0.002, high, 0.0, 0.0, 0.0, 1.0]},
+    ]

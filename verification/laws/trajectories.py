@@ -1,7 +1,8 @@
-"""Laws of a whole trajectory. Each law uses only the arrays of a run, so it can also check a stored run.
+"""Laws of a whole trajectory. Each law uses only the arrays of a run, so it can also check a stored
+run.
 
-A law returns a residual and its tolerance, or None if it does not apply. To add a law, write its function here, and add
-a fault to `planted`.
+A law returns a residual and its tolerance, or None if it does not apply. To add a law, write its
+function here, and add a fault to `planted`.
 """
 
 from __future__ import annotations
@@ -25,8 +26,20 @@ TRAJECTORY_LAWS: dict[str, Law] = {}
 BY_THE_ENGINE = ("impulse-augmented penalty", "penalty")
 TINY = float(np.finfo(float).tiny)
 HALF_TURN = np.pi / np.sqrt(3.0)  # [rad] of each of the three rates of a body
-_ARRAYS = ("time", "q", "v", "device_q", "device_v", "hand_force", "coupling_force", "penalty_force",
-           "friction_force", "impulse", "environment_force", "device_force")
+_ARRAYS = (
+    "time",
+    "q",
+    "v",
+    "device_q",
+    "device_v",
+    "hand_force",
+    "coupling_force",
+    "penalty_force",
+    "friction_force",
+    "impulse",
+    "environment_force",
+    "device_force",
+)
 _FORCES = ("hand", "coupling", "penalty", "friction")
 
 
@@ -38,17 +51,23 @@ class Trajectory:
 
     @property
     def by_the_engine(self) -> bool:
-        """Whether the engine made the run with semi-implicit Euler: first v changes, then q moves by the new v."""
-        return self.run.law in BY_THE_ENGINE and self.run.law_settings.get("integrator") == "semi_implicit_euler"
+        """Whether the engine made the run with semi-implicit Euler: first v changes, then q moves
+        by the new v."""
+        return (
+            self.run.law in BY_THE_ENGINE
+            and self.run.law_settings.get("integrator") == "semi_implicit_euler"
+        )
 
     @property
     def implicit(self) -> bool:
-        """Whether the forces of resting contacts follow from the velocity at the end of the step."""
+        """Whether the forces of resting contacts follow from the velocity at the end of the
+        step."""
         return bool(self.run.scene_resolved["contact"]["forces"] == "implicit")
 
     @property
     def is_explained(self) -> bool:
-        """Whether all that moves the bodies is recorded: a unilateral coupler moves the tool from outside."""
+        """Whether all that moves the bodies is recorded: a unilateral coupler moves the tool from
+        outside."""
         return self.by_the_engine and self.run.coupling != "unilateral"
 
     @cached_property
@@ -58,7 +77,8 @@ class Trajectory:
 
     @cached_property
     def masses(self) -> Floats:
-        """M at the beginning of each step, (n, d, d); a constant M is computed once and broadcast."""
+        """M at the beginning of each step, (n, d, d); a constant M is computed once and
+        broadcast."""
         mechanism, q = self.system.mechanism, self.run.q[:-1]
         if mechanism.has_constant_mass_matrix:
             one = mechanism.mass_matrix(q[0])
@@ -87,9 +107,13 @@ class Trajectory:
 
     @property
     def turns_over(self) -> bool:
-        """Whether a spatial body may turn by half a turn or more in a step, so that its displacement is ambiguous."""
+        """Whether a spatial body may turn by half a turn or more in a step, so that its
+        displacement is ambiguous."""
         run, mechanism = self.run, self.system.mechanism
-        return bool(mechanism.nq != mechanism.nv and run.dt * np.max(np.abs(run.v[1:]), initial=0.0) >= HALF_TURN)
+        return bool(
+            mechanism.nq != mechanism.nv
+            and run.dt * np.max(np.abs(run.v[1:]), initial=0.0) >= HALF_TURN
+        )
 
     @cached_property
     def displacements(self) -> Floats:
@@ -107,7 +131,8 @@ def norm(vector: Floats) -> Floats:
 
 @law(TRAJECTORY_LAWS, "finite", "the state stays finite, or the run stops and gives the reason")
 def state_stays_finite(trajectory: Trajectory) -> Found:
-    """Number of arrays with an entry that is not finite, plus 1 if an incomplete run gives no reason; tolerance 0."""
+    """Number of arrays with an entry that is not finite, plus 1 if an incomplete run gives no
+    reason; tolerance 0."""
     run = trajectory.run
     wrong = sum(not np.all(np.isfinite(getattr(run, name))) for name in _ARRAYS)
     wrong += sum(not np.all(np.isfinite(values)) for values in run.energy.values())
@@ -116,46 +141,59 @@ def state_stays_finite(trajectory: Trajectory) -> Found:
 
 @law(TRAJECTORY_LAWS, "impact_energy", "no impact raises kinetic energy")
 def impacts_take_energy(trajectory: Trajectory) -> Found:
-    """Theorem 2: largest energy gain over its bound 10 d ε √κ(M), for M restricted to the trees with an impulse."""
+    """Theorem 2: largest energy gain over its bound 10 d ε √κ(M), for M restricted to the trees
+    with an impulse."""
     impacts, ratios = trajectory.run.impacts, []
     for k, step in enumerate(impacts.step):
-        trees = [np.arange(a, b) for a, b in trajectory.system.mechanism.tree_dofs if impacts.impulse[k, a:b].any()]
+        trees = [
+            np.arange(a, b)
+            for a, b in trajectory.system.mechanism.tree_dofs
+            if impacts.impulse[k, a:b].any()
+        ]
         of = np.concatenate(trees) if trees else np.arange(impacts.impulse.shape[1])
         mass = trajectory.masses[step][np.ix_(of, of)]
         gain = relative_gain(mass, impacts.v_minus[k][of], impacts.v_plus[k][of])
         values = np.linalg.eigvalsh(mass)
-        ratios.append(gain / (FACTORED.factor * len(of) * EPS * float(np.sqrt(values[-1] / values[0]))))
+        ratios.append(
+            gain / (FACTORED.factor * len(of) * EPS * float(np.sqrt(values[-1] / values[0])))
+        )
     return (max(ratios), 1.0) if ratios else None
 
 
 @law(TRAJECTORY_LAWS, "impulse_momentum", "M(v⁺ − v⁻) is the recorded impulse")
 def impulses_explain_impacts(trajectory: Trajectory) -> Found:
-    """(8): largest of |M (v⁺ − v⁻) − impulse|∞ over d ε ‖M‖ |v|, and of the difference between a step's impulse and the
-    sum of its impacts' impulses.
+    """(8): largest of |M (v⁺ − v⁻) − impulse|∞ over d ε ‖M‖ |v|, and of the difference between a
+    step's impulse and the sum of its impacts' impulses.
 
-    Solving with M, scaled to a unit diagonal, causes an error ε κ of the scaled matrix; κ is computed here.
+    Solving with M, scaled to a unit diagonal, causes an error ε κ of the scaled matrix; κ is
+    computed here.
     """
     impacts, run = trajectory.run.impacts, trajectory.run
     if not len(impacts.step):
         return None
     masses = trajectory.masses[impacts.step]
     change = np.einsum("kij,kj->ki", masses, impacts.v_plus - impacts.v_minus)
-    size = norm(masses.reshape(len(masses), -1)) * norm(np.hstack([impacts.v_minus, impacts.v_plus]))
+    size = norm(masses.reshape(len(masses), -1)) * norm(
+        np.hstack([impacts.v_minus, impacts.v_plus])
+    )
     apart = norm(change - impacts.impulse) / np.maximum(size, TINY)
     total = np.zeros_like(run.impulse)
     np.add.at(total, impacts.step, impacts.impulse)
     lost = norm(total - run.impulse) / max(float(np.max(np.abs(run.impulse))), TINY)
     scale = 1.0 / np.sqrt(np.einsum("kii->ki", masses))
     condition = float(np.max(np.linalg.cond(masses * scale[:, :, None] * scale[:, None, :])))
-    return max(float(np.max(apart)), float(np.max(lost))), 10.0 * impacts.v_plus.shape[1] * EPS * condition
+    return max(float(np.max(apart)), float(np.max(lost))), 10.0 * impacts.v_plus.shape[
+        1
+    ] * EPS * condition
 
 
 @law(TRAJECTORY_LAWS, "motion", "velocities change as the recorded forces demand (1)")
 def forces_explain_motion(trajectory: Trajectory) -> Found:
     """Largest |M Δv − Δt (Σ F − B − G)|∞ over |M|(|v| + |v'|) + Δt Σ|F|, in units of d ε.
 
-    There is one scale per step, not per coordinate, because a force on one link causes rounding in the other equations.
-    Implicit contact is not checked: an iteration finds its forces, to less than rounding.
+    There is one scale per step, not per coordinate, because a force on one link causes rounding in
+    the other equations. Implicit contact is not checked: an iteration finds its forces, to less
+    than rounding.
     """
     if not trajectory.is_explained or trajectory.implicit:
         return None
@@ -172,39 +210,58 @@ def forces_explain_motion(trajectory: Trajectory) -> Found:
 
 @law(TRAJECTORY_LAWS, "kinematics", "q changes by the new velocity times the step")
 def velocity_moves_configuration(trajectory: Trajectory) -> Found:
-    """Largest |q_{k+1} − q_k ⊕ Δt v_{k+1}|∞ over |q| + Δt |v|; rotations are integrated, as they are no vectors."""
+    """Largest |q_{k+1} − q_k ⊕ Δt v_{k+1}|∞ over |q| + Δt |v|; rotations are integrated, as they
+    are no vectors."""
     if not trajectory.is_explained:
         return None
     run, mechanism = trajectory.run, trajectory.system.mechanism
     if mechanism.nq == mechanism.nv:
         moved = run.q[:-1] + run.dt * run.v[1:]
     else:
-        moved = np.array([mechanism.integrate(q, v, run.dt) for q, v in zip(run.q[:-1], run.v[1:], strict=True)])
+        moved = np.array(
+            [mechanism.integrate(q, v, run.dt) for q, v in zip(run.q[:-1], run.v[1:], strict=True)]
+        )
     size = 1.0 + norm(run.q[1:]) + run.dt * norm(run.v[1:])
     return float(np.max(norm(moved - run.q[1:]) / size)), 16.0 * EPS
 
 
 @law(TRAJECTORY_LAWS, "ledger", "stored energy, work and losses balance")
 def ledger_closes(trajectory: Trajectory) -> Found:
-    """Largest difference between a recorded and a recomputed energy term, relative to the energy exchanged.
+    """Largest difference between a recorded and a recomputed energy term, relative to the energy
+    exchanged.
 
-    Each work is the force times the displacement, and the impact losses follow from the velocities. With a constant
-    mass matrix the integrator's error is known exactly: see `_residuals`.
+    Each work is the force times the displacement, and the impact losses follow from the velocities.
+    With a constant mass matrix the integrator's error is known exactly: see `_residuals`.
     """
     run, system = trajectory.run, trajectory.system
     if not trajectory.is_explained or not run.energy:
         return None
-    works = {name: np.einsum("nd,nd->n", getattr(run, f"{name}_force"), trajectory.displacements) for name in _FORCES}
+    works = {
+        name: np.einsum("nd,nd->n", getattr(run, f"{name}_force"), trajectory.displacements)
+        for name in _FORCES
+    }
     _, potential = system.mechanism.energies(run.q, run.v, system.gravity)
     masses = np.concatenate([trajectory.masses, system.mechanism.mass_matrix(run.q[-1])[None]])
     kinetic = 0.5 * np.einsum("ni,nij,nj->n", run.v, masses, run.v)
-    size = float(np.max(kinetic) + np.max(np.abs(potential)) + sum(np.sum(np.abs(work)) for work in works.values()))
+    size = float(
+        np.max(kinetic)
+        + np.max(np.abs(potential))
+        + sum(np.sum(np.abs(work)) for work in works.values())
+    )
     impacts, losses = run.impacts, np.zeros(run.steps)
     v, dv = impacts.v_plus + impacts.v_minus, impacts.v_plus - impacts.v_minus
-    np.add.at(losses, impacts.step, -0.5 * np.einsum("ki,kij,kj->k", dv, trajectory.masses[impacts.step], v))
+    np.add.at(
+        losses,
+        impacts.step,
+        -0.5 * np.einsum("ki,kij,kj->k", dv, trajectory.masses[impacts.step], v),
+    )
     pairs = [(np.cumsum(works[name]), run.energy[f"{name}_work"]) for name in _FORCES]
-    pairs += [(kinetic, run.energy["kinetic"]), (potential, run.energy["potential"]),
-              (np.cumsum(losses), run.energy["impact_loss"]), _residuals(trajectory)]
+    pairs += [
+        (kinetic, run.energy["kinetic"]),
+        (potential, run.energy["potential"]),
+        (np.cumsum(losses), run.energy["impact_loss"]),
+        _residuals(trajectory),
+    ]
     wrong = max(float(np.max(np.abs(one - other), initial=0.0)) for one, other in pairs)
     return wrong / max(size, TINY), 10.0 * len(run.time) * EPS
 
@@ -212,17 +269,24 @@ def ledger_closes(trajectory: Trajectory) -> Found:
 def _residuals(trajectory: Trajectory) -> tuple[Floats, Floats]:
     """Energy error of the integration, recorded and as computed from the method.
 
-    Semi-implicit Euler loses ½ Δv·M Δv per step, with Δv due to the forces, and takes the weight −G as constant over a
-    step. Both are 0 if M varies, if contact is implicit (an iteration finds its forces, to less than rounding), or if a
-    spatial body turns by half a turn in a step, because its displacement then differs from the integrated motion.
+    Semi-implicit Euler loses ½ Δv·M Δv per step, with Δv due to the forces, and takes the weight −G
+    as constant over a step. Both are 0 if M varies, if contact is implicit (an iteration finds its
+    forces, to less than rounding), or if a spatial body turns by half a turn in a step, because its
+    displacement then differs from the integrated motion.
     """
     run = trajectory.run
-    if trajectory.implicit or trajectory.turns_over or not trajectory.system.mechanism.has_constant_mass_matrix:
+    if (
+        trajectory.implicit
+        or trajectory.turns_over
+        or not trajectory.system.mechanism.has_constant_mass_matrix
+    ):
         return np.zeros(1), np.zeros(1)
     dv = run.v[1:] - trajectory.v_struck
     lost = 0.5 * np.einsum("ni,nij,nj->n", dv, trajectory.masses, dv)
     constant_weight = np.einsum("nd,nd->n", trajectory.bias_and_gravity, trajectory.displacements)
-    return run.energy["integration_residual"], np.cumsum(np.diff(run.energy["potential"]) - constant_weight - lost)
+    return run.energy["integration_residual"], np.cumsum(
+        np.diff(run.energy["potential"]) - constant_weight - lost
+    )
 
 
 @law(TRAJECTORY_LAWS, "penalty", "resting contacts push with the force (5)")
@@ -242,7 +306,9 @@ def contacts_push_by_the_penalty(trajectory: Trajectory) -> Found:
         if np.any(contacts.normal_force < 0.0):
             return np.inf, 1.0
     size = K * np.abs(contacts.gap) + B * np.abs(contacts.normal_velocity) + TINY
-    apart = np.where(contacts.normal_force != 0.0, np.abs(contacts.normal_force - force) / size, 0.0)
+    apart = np.where(
+        contacts.normal_force != 0.0, np.abs(contacts.normal_force - force) / size, 0.0
+    )
     return float(np.max(apart)), 16.0 * EPS
 
 
@@ -250,8 +316,8 @@ def contacts_push_by_the_penalty(trajectory: Trajectory) -> Found:
 def friction_stays_in_its_cone(trajectory: Trajectory) -> Found:
     """(6): largest of |F_f| − μ F_n and |F_f · n|, relative to μ F_n; infinite if μ F_n = 0.
 
-    Subtracting v_n from the velocity rounds v_t by ε |v_n|, and (6) divides by v_threshold or more; the tolerance
-    covers this error.
+    Subtracting v_n from the velocity rounds v_t by ε |v_n|, and (6) divides by v_threshold or more;
+    the tolerance covers this error.
     """
     run, contacts = trajectory.run, trajectory.run.contacts
     if not trajectory.by_the_engine or trajectory.implicit or not len(contacts.gap):
@@ -259,19 +325,27 @@ def friction_stays_in_its_cone(trajectory: Trajectory) -> Found:
     most = trajectory.system.scene.largest_friction * np.maximum(contacts.normal_force, 0.0)
     length = np.linalg.norm(contacts.friction_force, axis=1)
     along = np.abs(np.einsum("ni,ni->n", contacts.friction_force, contacts.normal))
-    rounding = 1.0 + np.abs(contacts.normal_velocity) / run.scene_resolved["contact"]["friction_velocity"]
+    rounding = (
+        1.0 + np.abs(contacts.normal_velocity) / run.scene_resolved["contact"]["friction_velocity"]
+    )
     return float(np.max(over(np.maximum(length - most, along), most * rounding))), 16.0 * EPS
 
 
 @law(TRAJECTORY_LAWS, "friction_work", "friction does no positive work in any step")
 def friction_takes_energy(trajectory: Trajectory) -> Found:
-    """Largest F_f · Δq of a step of implicit contact, relative to the rounding of that sum; (6) may do positive work.
+    """Largest F_f · Δq of a step of implicit contact, relative to the rounding of that sum; (6) may
+    do positive work.
 
-    The work of a sticking contact is only rounding: each entry of Δq is the difference of two coordinates, and each
-    entry of F_f is a sum over the contacts, whose terms may cancel.
+    The work of a sticking contact is only rounding: each entry of Δq is the difference of two
+    coordinates, and each entry of F_f is a sum over the contacts, whose terms may cancel.
     """
     run, contacts = trajectory.run, trajectory.run.contacts
-    if not trajectory.implicit or run.law not in ENGINE_LAWS or not np.any(run.friction_force) or trajectory.turns_over:
+    if (
+        not trajectory.implicit
+        or run.law not in ENGINE_LAWS
+        or not np.any(run.friction_force)
+        or trajectory.turns_over
+    ):
         return None
     moved = trajectory.displacements
     work = np.einsum("nd,nd->n", run.friction_force, moved)
@@ -283,16 +357,22 @@ def friction_takes_energy(trajectory: Trajectory) -> Found:
 
 @law(TRAJECTORY_LAWS, "device_limits", "the device keeps its force limits")
 def device_keeps_its_limits(trajectory: Trajectory) -> Found:
-    """Largest |device force| over its limit; the law applies if the rendering fits impulses to the limits."""
+    """Largest |device force| over its limit; the law applies if the rendering fits impulses to the
+    limits."""
     run = trajectory.run
     limit = (run.scene_resolved.get("device") or {}).get("force_limit")
-    if limit is None or not run.device_force.size or run.law_settings.get("rendering", "full") == "full":
+    if (
+        limit is None
+        or not run.device_force.size
+        or run.law_settings.get("rendering", "full") == "full"
+    ):
         return None
     return float(np.max(np.abs(run.device_force) / np.array(limit))), 1.0
 
 
 def judge_run(run: Run) -> Iterator[tuple[str, LawResidual]]:
-    """Yield the residual of every law that applies to a run; if the run is not finite, yield only that residual."""
+    """Yield the residual of every law that applies to a run; if the run is not finite, yield only
+    that residual."""
     trajectory = Trajectory(run)
     for name, one in TRAJECTORY_LAWS.items():
         residual = one.check(trajectory)

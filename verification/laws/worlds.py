@@ -1,7 +1,7 @@
 """Laws of the states of a run, whatever world or engine made it, and their test on random scenes.
 
-Another engine gives configurations and velocities alone. Of the laws of a trajectory, those on forces do not apply
-then, and these remain.
+Another engine gives configurations and velocities alone. Of the laws of a trajectory, those on
+forces do not apply then, and these remain.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ from verification.laws.scenes import ROOM, Values, draw_scene, draw_spatial_scen
 from verification.laws.trajectories import Trajectory, judge_run, norm
 
 STATE_LAWS: dict[str, Law] = {}
-# What an integration over the drawn steps may make, and by how much a step's mean velocity may leave those at its ends.
+# What an integration over the drawn steps may make, and by how much a step's mean velocity may
+# leave those at its ends.
 CLOSE = 0.02
 PASSED = 0.1 * ROOM  # [m] an overlap that no stiff contact has
 INSTANTS = 100
@@ -30,7 +31,8 @@ KEPT = ("restitution", "friction")  # fields of contact that any engine can have
 
 @law(STATE_LAWS, "velocity", "each step moves the bodies by a velocity between those at its ends")
 def velocities_move_the_bodies(trajectory: Trajectory) -> Found:
-    """Largest |Δq/Δt − (v + v')/2| − |v' − v|/2 of a step, relative to the largest speed of the run."""
+    """Largest |Δq/Δt − (v + v')/2| − |v' − v|/2 of a step, relative to the largest speed of the
+    run."""
     run = trajectory.run
     if trajectory.turns_over:
         return None
@@ -43,7 +45,8 @@ def velocities_move_the_bodies(trajectory: Trajectory) -> Found:
 
 @law(STATE_LAWS, "energy", "energy never rises above the start and the work of the hand")
 def energy_is_not_made(trajectory: Trajectory) -> Found:
-    """Largest rise, relative to the largest kinetic energy, the change of potential energy and the hand's work."""
+    """Largest rise, relative to the largest kinetic energy, the change of potential energy and the
+    hand's work."""
     run = trajectory.run
     if run.coupling == "unilateral" or "potential" not in run.energy:
         return None
@@ -66,7 +69,8 @@ def bodies_stay_apart(trajectory: Trajectory) -> Found:
 
 
 def any_scene(values: Values) -> Scene:
-    """Return a drawn scene with restitution and friction alone, and a hand that holds the tool itself."""
+    """Return a drawn scene with restitution and friction alone, and a hand that holds the tool
+    itself."""
     kept = {
         name: value
         for name, value in values.items()

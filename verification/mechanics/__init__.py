@@ -1,1 +1,2 @@
-"""Studies of the mechanics of linkages and free bodies; `mechanics.mechanics` returns their common Finding."""
+"""Studies of the mechanics of linkages and free bodies; `mechanics.mechanics` returns their common
+Finding."""

@@ -1,9 +1,9 @@
-"""Differences between the engine and Pinocchio: mechanisms over many random states, and impacts of independent rows;
-and between the engine and the references: mechanics and contacts of a scene.
+"""Differences between the engine and Pinocchio: mechanisms over many random states, and impacts of
+independent rows; and between the engine and the references: mechanics and contacts of a scene.
 
-The mechanisms are random trees, trees with one kind of joint, the scenes, the project's robots and random URDF texts.
-Robots of other projects need a folder that is not part of this project. The engine and Pinocchio each read the URDF
-texts themselves.
+The mechanisms are random trees, trees with one kind of joint, the scenes, the project's robots and
+random URDF texts. Robots of other projects need a folder that is not part of this project. The
+engine and Pinocchio each read the URDF texts themselves.
 """
 
 from __future__ import annotations
@@ -29,7 +29,13 @@ from reference import Floats
 from reference.contact_finding import Contacts, find_contacts
 from reference.contact_rows import contact_jacobian, mechanics_of
 from reference.random_mechanisms import random_inertia, random_mechanism, random_state
-from reference.rigid_body import PinocchioMechanism, at_lever, impulse_dynamics, model_from_urdf, model_of
+from reference.rigid_body import (
+    PinocchioMechanism,
+    at_lever,
+    impulse_dynamics,
+    model_from_urdf,
+    model_of,
+)
 from verification.check import Check, Study
 from verification.finding import NOT_TESTABLE, Part, verdict_of_law
 from verification.impacts import EPS
@@ -38,7 +44,8 @@ from verification.table import Row, Table
 # Relative to the largest entry. For chains of 30 links each algorithm is accurate to about 1e-14.
 AGREEMENT = 1e-11
 EARTH = (0.0, 0.0, -9.81)  # [m/s^2]
-SAME = 1e-9  # contacts that differ by more are different contacts; rounding of a dozen products is about 1e-14
+# contacts that differ by more are different contacts; rounding of a dozen products is about 1e-14
+SAME = 1e-9
 STATES = 100
 TREE_SIZES = (1, 2, 4, 8, 16, 30)
 TREES = {"quick": 3, "full": 50}  # trees of each size
@@ -52,8 +59,10 @@ Pairs = list[tuple[Mechanism, PinocchioMechanism]]
 Pair = tuple[Any, Any]  # a quantity of ours, and of the reference
 
 TOLERANCE = (
-    f"{AGREEMENT:g} of the reference's largest entry; each algorithm is accurate to about 1e-14. A potential energy or "
-    "bias (Coriolis and centripetal forces) that nearly vanishes is compared with the size of the terms in its sum"
+    f"{AGREEMENT:g} of the reference's largest entry; each algorithm is accurate to about 1e-14. "
+    f"A potential energy or "
+    "bias (Coriolis and centripetal forces) that nearly vanishes is compared with the size of the "
+    "terms in its sum"
 )
 TREES_SET, OTHERS = "random trees", "robots beside the checkout"
 _SETS = {
@@ -87,18 +96,28 @@ def robot_files() -> list[Path]:
 def _cases(study: Study) -> Iterator[Case]:
     count, written = TREES[study.depth], WRITTEN[study.depth]
     for n in TREE_SIZES:
-        yield Case(TREES_SET, f"trees of {n}", "random", [SEED, n], partial(_trees, n, count, tuple(KINDS)))
+        yield Case(
+            TREES_SET, f"trees of {n}", "random", [SEED, n], partial(_trees, n, count, tuple(KINDS))
+        )
     for kind, n in product(KINDS, KIND_SIZES):
-        kinds = (kind,) if KINDS[kind].nv else (kind, "revolute")  # a tree of fixed joints alone has nothing to compare
+        kinds = (
+            (kind,) if KINDS[kind].nv else (kind, "revolute")
+        )  # a tree of fixed joints alone has nothing to compare
         yield Case("joint kinds", f"{n} {kind}", "random", [SEED, n], partial(_trees, n, 1, kinds))
     for path in sorted(SHIPPED.glob("*.yaml")):
         yield Case("scenes", path.stem, "of the scene", SEED, partial(_scene, path))
     bases = {"fixed": False, "floating": True}
-    for path, (base, floating) in product(sorted((SHIPPED / "robots").glob("*.urdf")), bases.items()):
-        yield Case("URDF texts", path.stem, base, [SEED, floating], partial(_read, [path], floating))
+    for path, (base, floating) in product(
+        sorted((SHIPPED / "robots").glob("*.urdf")), bases.items()
+    ):
+        yield Case(
+            "URDF texts", path.stem, base, [SEED, floating], partial(_read, [path], floating)
+        )
     for n, (base, floating) in product(WRITTEN_SIZES, bases.items()):
         label = f"{written} random texts of {n} joints"
-        yield Case("URDF texts", label, base, [SEED, floating], partial(_written, n, written, floating))
+        yield Case(
+            "URDF texts", label, base, [SEED, floating], partial(_written, n, written, floating)
+        )
     for path, (base, floating) in product(robot_files(), bases.items()):
         yield Case(OTHERS, path.stem, base, [SEED, floating], partial(_read, [path], floating))
 
@@ -114,7 +133,9 @@ def _scene(path: Path, _: np.random.Generator) -> Pairs:
 
 
 def _read(files: list[Path], floating: bool, _: np.random.Generator) -> Pairs:
-    return [(Mechanism.from_urdf(file, floating), model_from_urdf(file, floating)) for file in files]
+    return [
+        (Mechanism.from_urdf(file, floating), model_from_urdf(file, floating)) for file in files
+    ]
 
 
 def _written(links: int, count: int, floating: bool, rng: np.random.Generator) -> Pairs:
@@ -136,25 +157,34 @@ def _rows(_: Study, case: Case) -> Iterator[Row]:
                 largest[name] = max(value, largest.get(name, 0.0))
     if pairs:
         label = f"{len(pairs)} {case.label}" if case.set == TREES_SET else case.label
-        yield {"set": case.set, "mechanism": label, "base": case.base,
-               "velocities": max(mechanism.nv for mechanism, _model in pairs), "states": STATES * len(pairs),
-               **largest, "worst": max(largest.values())}  # fmt: skip
+        yield {
+            "set": case.set,
+            "mechanism": label,
+            "base": case.base,
+            "velocities": max(mechanism.nv for mechanism, _model in pairs),
+            "states": STATES * len(pairs),
+            **largest,
+            "worst": max(largest.values()),
+        }
 
 
 TYPES = ("revolute", "continuous", "prismatic", "floating", "fixed")
 
 
 def random_urdf(rng: np.random.Generator, links: int) -> str:
-    """Return the URDF text of a robot with a base and `links` more links, each attached to a random earlier link.
+    """Return the URDF text of a robot with a base and `links` more links, each attached to a random
+    earlier link.
 
-    It has every joint type but planar, whose coordinates differ between readers, rotated inertias, and names whose
-    order is not that of the lines.
+    It has every joint type but planar, whose coordinates differ between readers, rotated inertias,
+    and names whose order is not that of the lines.
     """
     names = [f"link_{k}" for k in rng.permutation(links + 1)]
     joints = [f"joint_{k}" for k in rng.permutation(links)]
     parts = [_link(rng, name) for name in names]
     for k, joint in enumerate(joints, start=1):
-        parts.append(_joint(rng, joint, TYPES[k % len(TYPES)], names[int(rng.integers(k))], names[k]))
+        parts.append(
+            _joint(rng, joint, TYPES[k % len(TYPES)], names[int(rng.integers(k))], names[k])
+        )
     return "\n".join(['<robot name="random">', *parts, "</robot>"])
 
 
@@ -163,15 +193,19 @@ def _link(rng: np.random.Generator, name: str) -> str:
     inertia = random_inertia(rng, mass)
     places = [(i, j) for i in range(3) for j in range(i, 3)]
     entries = " ".join(f'i{"xyz"[i]}{"xyz"[j]}="{float(inertia[i, j])!r}"' for i, j in places)
-    return (f'<link name="{name}"><inertial>{_origin(rng)}<mass value="{mass!r}"/>'
-            f"<inertia {entries}/></inertial></link>")  # fmt: skip
+    return (
+        f'<link name="{name}"><inertial>{_origin(rng)}<mass value="{mass!r}"/>'
+        f"<inertia {entries}/></inertial></link>"
+    )
 
 
 def _joint(rng: np.random.Generator, name: str, kind: str, parent: str, child: str) -> str:
     axis = rng.normal(size=3)
     limits = '<limit lower="-3" upper="3" effort="10" velocity="10"/>'
-    return (f'<joint name="{name}" type="{kind}">{_origin(rng)}<parent link="{parent}"/><child link="{child}"/>'
-            f'<axis xyz="{_numbers(axis)}"/>{limits}</joint>')  # fmt: skip
+    return (
+        f'<joint name="{name}" type="{kind}">{_origin(rng)}<parent link="{parent}"/><child link="{child}"/>'
+        f'<axis xyz="{_numbers(axis)}"/>{limits}</joint>'
+    )
 
 
 def _origin(rng: np.random.Generator) -> str:
@@ -183,15 +217,20 @@ def _numbers(values: Floats) -> str:
 
 
 def compare(
-    mechanism: Mechanism, reference: PinocchioMechanism, q: Floats, v: Floats, gravity: ArrayLike = EARTH
+    mechanism: Mechanism,
+    reference: PinocchioMechanism,
+    q: Floats,
+    v: Floats,
+    gravity: ArrayLike = EARTH,
 ) -> dict[str, float]:
     """Return the largest difference of each quantity, relative to the reference's largest entry.
 
-    Some quantities use another scale. The potential energy, whose zero is a convention, is relative to the sum of
-    m |g| |c|. A bias may nearly vanish (a centre of mass almost on its axis, a body that hardly turns), so its scale is
-    at least the size of the terms in its sum. These are m |c| w^2 with the fastest rate w, because the rounding of the
-    world positions c affects every lever arm, and v x m v, which is zero but is computed from terms of the size of
-    twice the kinetic energy. Point Jacobians are compared at a point one metre off each body's origin.
+    Some quantities use another scale. The potential energy, whose zero is a convention, is relative
+    to the sum of m |g| |c|. A bias may nearly vanish (a centre of mass almost on its axis, a body
+    that hardly turns), so its scale is at least the size of the terms in its sum. These are m |c|
+    w^2 with the fastest rate w, because the rounding of the world positions c affects every lever
+    arm, and v x m v, which is zero but is computed from terms of the size of twice the kinetic
+    energy. Point Jacobians are compared at a point one metre off each body's origin.
     """
     m, p, dv = mechanism, reference, np.cos(np.arange(mechanism.nv))
     (rotations, positions), (axes, origins, rows) = m.placements(q), p.bodies(q)
@@ -207,15 +246,20 @@ def compare(
         "placements and Jacobians": max(map(apart, (places, frames, points))),
         "bias": apart([(m.bias(q, v), p.bias(q, v))], _swung(m, q, v)),
         "gravity": apart([(m.gravity(q, gravity), p.gravity(q, gravity))]),
-        "inverse dynamics": apart([(m.inverse_dynamics(q, v, dv, gravity), p.inverse_dynamics(q, v, dv, gravity))]),
-        "energies": max(apart([(m.kinetic_energy(q, v), p.kinetic_energy(q, v))]),
-                        apart([(m.potential_energy(q, gravity), p.potential_energy(q, gravity))], lifted)),
+        "inverse dynamics": apart(
+            [(m.inverse_dynamics(q, v, dv, gravity), p.inverse_dynamics(q, v, dv, gravity))]
+        ),
+        "energies": max(
+            apart([(m.kinetic_energy(q, v), p.kinetic_energy(q, v))]),
+            apart([(m.potential_energy(q, gravity), p.potential_energy(q, gravity))], lifted),
+        ),
         "momentum": apart([(m.centroidal_momentum(q, v), p.centroidal_momentum(q, v))]),
-    }  # fmt: skip
+    }
 
 
 def _swung(mechanism: Mechanism, q: Floats, v: Floats) -> float:
-    """Sum of m |c| w^2 [N], or of m v^2 [N m]: the size of the terms of a bias, whose sum may be near zero."""
+    """Sum of m |c| w^2 [N], or of m v^2 [N m]: the size of the terms of a bias, whose sum may be
+    near zero."""
     fastest = float(np.max(np.abs(v[mechanism.arrays.dof_rotates]), initial=0.0))
     return max(fastest**2 * _spread(mechanism, q), 2.0 * mechanism.kinetic_energy(q, v))
 
@@ -224,11 +268,14 @@ def _spread(mechanism: Mechanism, q: Floats) -> float:
     """Sum of m |c| [kg m]."""
     rotations, positions = mechanism.placements(q)
     bodies = zip(mechanism.bodies, rotations, positions, strict=True)
-    return sum(body.mass * float(np.linalg.norm(p + R @ body.center_of_mass)) for body, R, p in bodies)
+    return sum(
+        body.mass * float(np.linalg.norm(p + R @ body.center_of_mass)) for body, R, p in bodies
+    )
 
 
 def relative_difference(pairs: list[Pair], floor: float = 0.0) -> float:
-    """Return the largest |ours - theirs| of all pairs, divided by the larger of `floor` and the largest |theirs|."""
+    """Return the largest |ours - theirs| of all pairs, divided by the larger of `floor` and the
+    largest |theirs|."""
     scale = max([floor, *(float(np.max(np.abs(theirs), initial=0.0)) for _, theirs in pairs)])
     gap = max([0.0, *(float(np.max(np.abs(ours - theirs), initial=0.0)) for ours, theirs in pairs)])
     return gap / scale if scale > 0.0 else gap
@@ -239,25 +286,42 @@ def agreement(table: Table) -> Iterator[Part]:
     for name, words in _SETS.items():
         found = table.where(set=name)
         if not found.rows:
-            yield Part(f"Robots of other projects are not compared: the optional folder {ROBOTS.name}/ beside the "
-                       "project has no URDF files.", NOT_TESTABLE, optional=True)
+            yield Part(
+                f"Robots of other projects are not compared: the optional folder {ROBOTS.name}/ "
+                f"beside the "
+                "project has no URDF files.",
+                NOT_TESTABLE,
+                optional=True,
+            )
             continue
         yield Part.of(
             f"{words}: largest difference from Pinocchio in {sum(found['states']):,} random states",
-            f"{max(found['worst']):.1e} of the largest entry", f"at most {AGREEMENT:g}", verdict_of_law(found.holds))
+            f"{max(found['worst']):.1e} of the largest entry",
+            f"at most {AGREEMENT:g}",
+            verdict_of_law(found.holds),
+        )
 
 
 AGAINST_PINOCCHIO = Check(
-    key="against Pinocchio", question="Mass matrix, Jacobians, forces, energies and momentum are those of Pinocchio.",
-    cases=_cases, row=_rows, holds=lambda row: bool(row["worst"] <= AGREEMENT), says=agreement, digits=2,
+    key="against Pinocchio",
+    question="Mass matrix, Jacobians, forces, energies and momentum are those of Pinocchio.",
+    cases=_cases,
+    row=_rows,
+    holds=lambda row: bool(row["worst"] <= AGREEMENT),
+    says=agreement,
+    digits=2,
     note=f"Largest difference over all states. Tolerance: {TOLERANCE}.",
-)  # fmt: skip
+)
 
-_EASY, _HARDEST = 10.0, 1e6  # condition numbers κ(A): up to the first, plain rounding; beyond the second, not compared
+_EASY, _HARDEST = (
+    10.0,
+    1e6,
+)  # condition numbers κ(A): up to the first, plain rounding; beyond the second, not compared
 
 
 def _impulse_dynamics(_: Study, impacts: int) -> Iterator[Row]:
-    """Yield the largest differences of v⁺ between the engine and Pinocchio's impulseDynamics, kinetic metric."""
+    """Yield the largest differences of v⁺ between the engine and Pinocchio's impulseDynamics,
+    kinetic metric."""
     rng, shares, easy = np.random.default_rng(2), list[float](), list[float]()
     for _impact in range(impacts):
         d = int(rng.integers(1, 13))
@@ -273,28 +337,42 @@ def _impulse_dynamics(_: Study, impacts: int) -> Iterator[Row]:
         error = float(np.linalg.norm(L.T @ difference) / np.linalg.norm(L.T @ v))
         shares.append(error / (100.0 * d * EPS * condition**2))
         easy += [error] if condition <= _EASY else []
-    yield {"quantity": "v⁺ of independent rows, as a share of 100 d ε κ(W)", "cases": len(shares),
-           "largest difference": max(shares), "tolerance": 1.0,
-           "why this tolerance": "a hundred roundings per coordinate, times the condition number of W"}  # fmt: skip
-    yield {"quantity": "v⁺ where κ(W) ≤ 100, relative to |v⁻|", "cases": len(easy), "largest difference": max(easy),
-           "tolerance": 1e-12, "why this tolerance": "plain rounding"}  # fmt: skip
+    yield {
+        "quantity": "v⁺ of independent rows, as a share of 100 d ε κ(W)",
+        "cases": len(shares),
+        "largest difference": max(shares),
+        "tolerance": 1.0,
+        "why this tolerance": "a hundred roundings per coordinate, times the condition number of W",
+    }
+    yield {
+        "quantity": "v⁺ where κ(W) ≤ 100, relative to |v⁻|",
+        "cases": len(easy),
+        "largest difference": max(easy),
+        "tolerance": 1e-12,
+        "why this tolerance": "plain rounding",
+    }
 
 
 IMPULSE_DYNAMICS = Check(
-    key="impulse dynamics", question="Velocities after impacts at independent contacts agree with Pinocchio's.",
-    cases=lambda _: (2000,), row=_impulse_dynamics, prose=("why this tolerance",), digits=2,
+    key="impulse dynamics",
+    question="Velocities after impacts at independent contacts agree with Pinocchio's.",
+    cases=lambda _: (2000,),
+    row=_impulse_dynamics,
+    prose=("why this tolerance",),
+    digits=2,
     holds=lambda row: bool(row["largest difference"] <= row["tolerance"]),
-)  # fmt: skip
+)
 
 
 # Mechanics and contacts of a scene, by the engine and by the references.
 def scene_difference(scene: Scene, configurations: int = 50, seed: int = 0) -> Row:
     """Compare the engine's mechanics and narrow phase with Pinocchio and `contact_finding`.
 
-    The configurations are the initial one of the scene and random ones around it, displaced by 1e-6 to 1 [m, rad]. The
-    differences are the largest ones: relative to the largest entry for mechanics, absolute for contacts. "With other
-    contacts" counts configurations whose contacts differ in number or by more than SAME, for instance because two faces
-    are equally close and each side takes another one.
+    The configurations are the initial one of the scene and random ones around it, displaced by 1e-6
+    to 1 [m, rad]. The differences are the largest ones: relative to the largest entry for
+    mechanics, absolute for contacts. "With other contacts" counts configurations whose contacts
+    differ in number or by more than SAME, for instance because two faces are equally close and each
+    side takes another one.
     """
     system, rng = System(scene), np.random.default_rng(seed)
     m, start = system.mechanism, system.make_state().q
@@ -309,9 +387,18 @@ def scene_difference(scene: Scene, configurations: int = 50, seed: int = 0) -> R
         else:
             contacts, compared = np.maximum(contacts, found[1]), compared + found[0]
     (mass, inner, frame), (_, normal, gap, row) = mechanics.tolist(), contacts.tolist()
-    return {"scene": scene.name, "configurations": configurations, "with other contacts": apart, "M": mass,
-            "B + G": inner, "frame Jacobians": frame, "contacts": compared, "gap [m]": gap, "normal": normal,
-            "contact row": row}  # fmt: skip
+    return {
+        "scene": scene.name,
+        "configurations": configurations,
+        "with other contacts": apart,
+        "M": mass,
+        "B + G": inner,
+        "frame Jacobians": frame,
+        "contacts": compared,
+        "gap [m]": gap,
+        "normal": normal,
+        "contact row": row,
+    }
 
 
 def _mechanics_apart(system: System, q: Floats, v: Floats) -> list[float]:
@@ -322,13 +409,18 @@ def _mechanics_apart(system: System, q: Floats, v: Floats) -> list[float]:
     weight = float(np.linalg.norm(system.gravity)) * _spread(m, q)
     return [
         relative_difference([(m.mass_matrix(q), reference.mass_matrix(q))]),
-        relative_difference([(m.bias(q, v) + m.gravity(q, system.gravity), inner)], max(_swung(m, q, v), weight)),
-        relative_difference([(np.array([m.frame_jacobian(q, b) for b in range(len(frames))]), frames)]),
+        relative_difference(
+            [(m.bias(q, v) + m.gravity(q, system.gravity), inner)], max(_swung(m, q, v), weight)
+        ),
+        relative_difference(
+            [(np.array([m.frame_jacobian(q, b) for b in range(len(frames))]), frames)]
+        ),
     ]
 
 
 def _contacts_apart(system: System, q: Floats) -> tuple[int, Floats] | None:
-    """Number of contacts, and largest differences (4,) of point, normal, gap, row; None if these are other contacts."""
+    """Number of contacts, and largest differences (4,) of point, normal, gap, row; None if these
+    are other contacts."""
     axes, origins, frames = mechanics_of(system).bodies(q)
     theirs = find_contacts(system.shapes, system.pairs, axes, origins, np.inf)
     found = system.contacts_at(q, np.inf)
@@ -336,12 +428,21 @@ def _contacts_apart(system: System, q: Floats) -> tuple[int, Floats] | None:
     count = len(ours.gap)
     if count != len(theirs.gap):
         return None
-    first, second = ((each.point, each.normal, each.gap, contact_jacobian(each.normal, each, origins, frames))
-                     for each in (ours, theirs))  # fmt: skip
+    first, second = (
+        (each.point, each.normal, each.gap, contact_jacobian(each.normal, each, origins, frames))
+        for each in (ours, theirs)
+    )
     worst, left = np.zeros(4), list(range(count))
     for i in range(count):
-        pair = [j for j in left if theirs.shape_a[j] == ours.shape_a[i] and theirs.shape_b[j] == ours.shape_b[i]]
-        apart = {j: [float(np.abs(a[i] - b[j]).max()) for a, b in zip(first, second, strict=True)] for j in pair}
+        pair = [
+            j
+            for j in left
+            if theirs.shape_a[j] == ours.shape_a[i] and theirs.shape_b[j] == ours.shape_b[i]
+        ]
+        apart = {
+            j: [float(np.abs(a[i] - b[j]).max()) for a, b in zip(first, second, strict=True)]
+            for j in pair
+        }
         nearest = min(pair, key=lambda j: max(apart[j]), default=None)
         if nearest is None or max(apart[nearest]) > SAME:
             return None

@@ -11,7 +11,8 @@ from verification.table import Row
 
 SIZES = (1, 3, 10, 30)  # joints
 MATRICES = {"quick": 150, "full": 2000}
-# Condition number of M scaled to a unit diagonal, above which rounding determines the sign of the least eigenvalue.
+# Condition number of M scaled to a unit diagonal, above which rounding determines the sign of the
+# least eigenvalue.
 LARGEST_CONDITION = 1e12
 SEED = 20050603
 
@@ -37,14 +38,22 @@ def _definite(study: Study, joints: int) -> Row:
         if condition <= LARGEST_CONDITION:
             conditions.append(condition)
             least.append(float(np.linalg.eigvalsh(_scaled(mass))[0]) * condition)
-    return {"joints": joints, "mass matrices": count, "judged, condition ≤ 1e12": len(conditions),
-            "largest condition judged": max(conditions), "least eigenvalue × condition": min(least)}  # fmt: skip
+    return {
+        "joints": joints,
+        "mass matrices": count,
+        "judged, condition ≤ 1e12": len(conditions),
+        "largest condition judged": max(conditions),
+        "least eigenvalue × condition": min(least),
+    }
 
 
 POSITIVE_DEFINITE = Check(
-    key="positive definite", question="The mass matrix is positive definite wherever rounding permits a judgement.",
-    cases=lambda _: SIZES, row=_definite, spans=("largest condition judged", "least eigenvalue × condition"),
+    key="positive definite",
+    question="The mass matrix is positive definite wherever rounding permits a judgement.",
+    cases=lambda _: SIZES,
+    row=_definite,
+    spans=("largest condition judged", "least eigenvalue × condition"),
     holds=lambda row: bool(row["least eigenvalue × condition"] > 0.0),
     note="Condition and eigenvalue are those of M scaled to a unit diagonal. A row holds if all judged eigenvalues are "
     f"positive. Above a condition of {LARGEST_CONDITION:g} rounding decides the sign, so the matrix is not judged.",
-)  # fmt: skip
+)

@@ -13,17 +13,25 @@ from verification.table import Table
 
 
 def _answer(tables: Mapping[str, Table], _: Sequence[Part]) -> str:
-    worst, balls = max(tables[AGAINST_PINOCCHIO.key]["worst"], default=0.0), tables[LINKED_IMPACTS.key]
+    worst, balls = (
+        max(tables[AGAINST_PINOCCHIO.key]["worst"], default=0.0),
+        tables[LINKED_IMPACTS.key],
+    )
     lost = min(balls.where(treatment=PER_BODY)["momentum change"])
-    return (f"Mass matrices, forces and Jacobians differ from Pinocchio's by at most {worst:.1e} of the largest "
-            "entry. (13)-(14) give each of two touching bodies its own impulse: a ball rebounds from resting balls as "
-            f"from a wall, and the total momentum changes by at least {lost:.2g} times its value.")
+    return (
+        f"Mass matrices, forces and Jacobians differ from Pinocchio's by at most {worst:.1e} of "
+        f"the largest "
+        "entry. (13)-(14) give each of two touching bodies its own impulse: a ball rebounds from "
+        "resting balls as "
+        f"from a wall, and the total momentum changes by at least {lost:.2g} times its value."
+    )
 
 
 mechanics = Topic(
-    key="mechanics", title="Linkages and free bodies",
+    key="mechanics",
+    title="Linkages and free bodies",
     question="The engine describes free bodies and linkages by generalized coordinates (1)-(3). This page compares its "
     "mechanics with Pinocchio and with conservation laws. It then shows impacts between touching balls.",
     checks=(AGAINST_PINOCCHIO, IMPULSE_DYNAMICS, POSITIVE_DEFINITE, LINKED_IMPACTS),
     says=_answer,
-)  # fmt: skip
+)

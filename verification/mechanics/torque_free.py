@@ -1,13 +1,15 @@
-"""Closed form of a torque-free rigid body: Jacobi's elliptic functions for the rates, a quadrature for an angle.
+"""Closed form of a torque-free rigid body: Jacobi's elliptic functions for the rates, a quadrature
+for an angle.
 
-Source: Landau and Lifshitz, Mechanics, section 37. Principal moments I1 < I2 < I3, energy E, angular momentum L with
-L^2 > 2 E I2 (the body tumbles about its third axis); at t = 0 the second rate is zero and the others are positive:
+Source: Landau and Lifshitz, Mechanics, section 37. Principal moments I1 < I2 < I3, energy E,
+angular momentum L with L^2 > 2 E I2 (the body tumbles about its third axis); at t = 0 the second
+rate is zero and the others are positive:
 
     w1 = A cn(s t | m),  w2 = B sn(s t | m),  w3 = C dn(s t | m).
 
-The attitude follows because L is constant in space: two angles between the body axes and L are algebraic functions of
-w. The third satisfies d(psi)/dt = L (2 E - I3 w3^2) / (L^2 - I3^2 w3^2), which Gauss-Legendre quadrature integrates to
-machine precision.
+The attitude follows because L is constant in space: two angles between the body axes and L are
+algebraic functions of w. The third satisfies d(psi)/dt = L (2 E - I3 w3^2) / (L^2 - I3^2 w3^2),
+which Gauss-Legendre quadrature integrates to machine precision.
 """
 
 from __future__ import annotations
@@ -19,12 +21,14 @@ import numpy as np
 
 from reference import Floats
 
-_NODES = 20  # Gauss-Legendre nodes per quarter period: the integrand is smooth and the error is below 1e-15
+# Gauss-Legendre nodes per quarter period: the integrand is smooth and the error is below 1e-15
+_NODES = 20
 
 
 @dataclass(frozen=True)
 class TorqueFreeBody:
-    """Ascending principal moments [kg m^2], and the amplitudes A and C [rad/s] of the first and third rate."""
+    """Ascending principal moments [kg m^2], and the amplitudes A and C [rad/s] of the first and
+    third rate."""
 
     moments: tuple[float, float, float]
     first_rate: float
@@ -71,7 +75,8 @@ class TorqueFreeBody:
     def axes(self, time: float) -> Floats:
         """Body axes as columns (3, 3), in a frame whose z axis is along the angular momentum.
 
-        R = Rz(psi) F(w), where F(w) rotates the direction of L in the body frame, h = I w / L, to z.
+        R = Rz(psi) F(w), where F(w) rotates the direction of L in the body frame, h = I w / L, to
+        z.
         """
         angle = self._turned(time)
         c, s = np.cos(angle), np.sin(angle)
@@ -92,7 +97,8 @@ class TorqueFreeBody:
 
 
 def _frame(h: Floats) -> Floats:
-    """Return F (3, 3) with F h = z and first row along e3 x h; F is smooth as long as h differs from e3."""
+    """Return F (3, 3) with F h = z and first row along e3 x h; F is smooth as long as h differs
+    from e3."""
     across = np.array([-h[1], h[0], 0.0])
     across /= np.linalg.norm(across)
     return np.array([across, np.cross(h, across), h])

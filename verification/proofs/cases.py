@@ -1,7 +1,8 @@
-"""Exact values for the letters of a statement, and what holds there, by rational arithmetic alone (python-flint).
+"""Exact values for the letters of a statement, and what holds there, by rational arithmetic alone
+(python-flint).
 
-A `Case` gives every letter a rational matrix and every scalar a 1 x 1 matrix. Cases refute false variants of statements
-and show that hypotheses are needed.
+A `Case` gives every letter a rational matrix and every scalar a 1 x 1 matrix. Cases refute false
+variants of statements and show that hypotheses are needed.
 """
 
 from __future__ import annotations
@@ -19,7 +20,13 @@ from iapb.errors import ArgumentError
 from verification.proofs.words import ANY, Expression, Fact, names_in
 
 Case = dict[str, fmpq_mat]
-_RELATIONS = {"=": operator.eq, "<": operator.lt, "≤": operator.le, ">": operator.gt, "≥": operator.ge}
+_RELATIONS = {
+    "=": operator.eq,
+    "<": operator.lt,
+    "≤": operator.le,
+    ">": operator.gt,
+    "≥": operator.ge,
+}
 _VALUE = re.compile(r"(\S+?)=(\[[^\]]*\]|\S+)")
 
 
@@ -37,11 +44,17 @@ class Comparison(NamedTuple):
 
 
 def read_case(text: str, names: Iterable[str], base: Mapping[str, fmpq_mat] | None = None) -> Case:
-    """Return the case `M=[1 0; 0 1/2] e=−1 ...`; a letter that it leaves out has its value in `base`."""
-    rows = {name: value.strip("[]").replace("−", "-").split(";") for name, value in _VALUE.findall(text)}
+    """Return the case `M=[1 0; 0 1/2] e=−1 ...`; a letter that it leaves out has its value in
+    `base`."""
+    rows = {
+        name: value.strip("[]").replace("−", "-").split(";") for name, value in _VALUE.findall(text)
+    }
     if _VALUE.sub("", text).strip() or not set(rows) <= set(names):
         raise ArgumentError("case", text, f"values of {' '.join(names)}")
-    return {**(base or {}), **{name: matrix_of([row.split() for row in value]) for name, value in rows.items()}}
+    return {
+        **(base or {}),
+        **{name: matrix_of([row.split() for row in value]) for name, value in rows.items()},
+    }
 
 
 def matrix_of(rows: Sequence[Sequence[Fraction | int | str]]) -> fmpq_mat:
@@ -57,17 +70,26 @@ def value_of(value: Expression, case: Case) -> fmpq_mat:
     for letter in {each for _, word in value.terms for each in word}:
         rows, cols = (letter.cols, letter.rows) if letter.flipped else (letter.rows, letter.cols)
         sizes |= {rows: case[letter.name].nrows(), cols: case[letter.name].ncols()}
-    identity = fmpq_mat([[int(i == j) for j in range(sizes[value.rows])] for i in range(sizes[value.rows])])
+    identity = fmpq_mat(
+        [[int(i == j) for j in range(sizes[value.rows])] for i in range(sizes[value.rows])]
+    )
     total = fmpq_mat(sizes[value.rows], sizes[value.cols])
     for (scalars, word), coefficient in value.terms.items():
-        factors = [case[each.name].transpose() if each.flipped else case[each.name] for each in word]
-        scale = reduce(operator.mul, [case[name][0, 0] for name in scalars], fmpq(*coefficient.as_integer_ratio()))
+        factors = [
+            case[each.name].transpose() if each.flipped else case[each.name] for each in word
+        ]
+        scale = reduce(
+            operator.mul,
+            [case[name][0, 0] for name in scalars],
+            fmpq(*coefficient.as_integer_ratio()),
+        )
         total += reduce(operator.mul, factors or [identity]) * scale
     return total
 
 
 def completed(case: Case, definitions: Iterable[Fact]) -> Case:
-    """Return the case in which each defined letter (left side) has the value of its definition (right side)."""
+    """Return the case in which each defined letter (left side) has the value of its definition
+    (right side)."""
     values = dict(case)
     for definition in definitions:
         (name,) = names_in(definition.lhs)
@@ -90,7 +112,8 @@ def all_hold(facts: Iterable[Fact], case: Case) -> bool:
 
 
 def definite(value: fmpq_mat, *, strict: bool) -> bool:
-    """Whether x' A x >= 0 (strict: > 0) for every x other than 0, by exact elimination on the symmetric part of A."""
+    """Whether x' A x >= 0 (strict: > 0) for every x other than 0, by exact elimination on the
+    symmetric part of A."""
     a = (value + value.transpose()).tolist()
     for k, row in enumerate(a):
         if row[k] < 0 or (row[k] == 0 and (strict or any(row[k:]))):
@@ -103,8 +126,9 @@ def definite(value: fmpq_mat, *, strict: bool) -> bool:
 def pseudo_inverse(matrix: Any) -> Any:
     """Return the Moore-Penrose inverse of a rational matrix of python-flint.
 
-    A = C R, where C has the independent columns and R is the reduced echelon form; A† = Rᵀ(R Rᵀ)⁻¹(CᵀC)⁻¹Cᵀ.
-    Source: Ben-Israel and Greville, Generalized Inverses (2003), theorem 1.5 (MacDuffee).
+    A = C R, where C has the independent columns and R is the reduced echelon form; A† = Rᵀ(R
+    Rᵀ)⁻¹(CᵀC)⁻¹Cᵀ. Source: Ben-Israel and Greville, Generalized Inverses (2003), theorem 1.5
+    (MacDuffee).
     """
     reduced, rank = matrix.rref()
     if rank == 0:

@@ -1,13 +1,14 @@
-"""The layout of statements as text; the formulas in them are read elsewhere, by each of the two kernels on its own.
+"""The layout of statements as text; the formulas in them are read elsewhere, by each of the two
+kernels on its own.
 
-A statement starts with its name at the margin. Each entry is indented by two or four spaces and starts with a keyword;
-what is indented further continues it. Keywords:
+A statement starts with its name at the margin. Each entry is indented by two or four spaces and
+starts with a keyword; what is indented further continues it. Keywords:
 
-title, source, says       prose, with LaTeX between dollar signs; so are remark, assumed and measured
-letters  M N: d d, v: d, e    matrices with their sizes, vectors, scalars (without sizes)
+title, source, says       prose, with LaTeX between dollar signs; so are remark, assumed and
+measured letters  M N: d d, v: d, e    matrices with their sizes, vectors, scalars (without sizes)
 let      W = J N Jᵀ; ...  abbreviations
-case     M=1 e=0          exact values for which all hypotheses hold (the witness); `case NAME: ...` has a name
-where    the definition of a letter; it assumes nothing
+case     M=1 e=0          exact values for which all hypotheses hold (the witness); `case NAME: ...`
+has a name where    the definition of a letter; it assumes nothing
 given    a hypothesis (several, separated by semicolons, if they state one property)
 use      takes over the entries of another statement
 lemma    a step of the proof; show: one that is a conclusion
@@ -16,9 +17,10 @@ by       its cofactors, with equations in square brackets; or cancelling, dividi
 numbers  the comparisons of rational numbers that `numbers` computes
 twin     a false variant
 
-An entry has the parts  WORDS :: FORMULA @ CASE -- NOTE;  only the formula is needed. The formula fails in the case:
-for a hypothesis while all others hold and a conclusion is false, for a twin while all hypotheses hold. A case may start
-from a named case (`NAME: e=2`); without a name it starts from the witness.
+An entry has the parts  WORDS :: FORMULA @ CASE -- NOTE;  only the formula is needed. The formula
+fails in the case: for a hypothesis while all others hold and a conclusion is false, for a twin
+while all hypotheses hold. A case may start from a named case (`NAME: e=2`); without a name it
+starts from the witness.
 """
 
 from __future__ import annotations
@@ -34,10 +36,32 @@ from iapb.names import one_of
 
 FOLDER = Path(__file__).with_name("statements")
 # In reading order; the file `shared` has letters and lemmas for all and states nothing itself.
-FILES = ("theorems", "redundant_rows", "consequences", "resting_contact", "resolver", "impact_laws", "errata",
-         "floating_point", "exact_instances")  # fmt: skip
+FILES = (
+    "theorems",
+    "redundant_rows",
+    "consequences",
+    "resting_contact",
+    "resolver",
+    "impact_laws",
+    "errata",
+    "floating_point",
+    "exact_instances",
+)
 _PROSE = {"title", "source", "says", "remark", "assumed", "measured"}
-_KEYS = _PROSE | {"letters", "let", "case", "where", "given", "use", "lemma", "show", "sum", "by", "numbers", "twin"}
+_KEYS = _PROSE | {
+    "letters",
+    "let",
+    "case",
+    "where",
+    "given",
+    "use",
+    "lemma",
+    "show",
+    "sum",
+    "by",
+    "numbers",
+    "twin",
+}
 
 
 class Entry(NamedTuple):
@@ -78,7 +102,9 @@ class Block:
     @property
     def abbreviations(self) -> list[tuple[str, str]]:
         """The names and formulas of `let`."""
-        both = (each.partition("=") for entry in self.all("let") for each in entry.formula.split(";"))
+        both = (
+            each.partition("=") for entry in self.all("let") for each in entry.formula.split(";")
+        )
         return [(name.strip(), formula.strip()) for name, _, formula in both]
 
 

@@ -1,4 +1,5 @@
-"""Checks of a statement: its steps, its witness, the need for each hypothesis, and its false variants (twins)."""
+"""Checks of a statement: its steps, its witness, the need for each hypothesis, and its false
+variants (twins)."""
 
 from __future__ import annotations
 
@@ -29,36 +30,70 @@ def checked(block: Block) -> ProofRecord:
     statement = Statement(block)
     known = Known([*statement.given, *statement.definitions])
     steps = [_checked(task, known) for task in statement.tasks]
-    comparisons, false_ones = numbers.BY_STATEMENT[block.name]() if block.all("numbers") else ((), ())
+    comparisons, false_ones = (
+        numbers.BY_STATEMENT[block.name]() if block.all("numbers") else ((), ())
+    )
     needed = tuple(_needed(entry, facts, statement) for entry, facts in statement.hypotheses)
-    twins = (*(_twin(entry, statement) for entry in block.all("twin")),
-             *(Refutation(title, number_line(*claim), (), note, not claim.is_true)
-               for title, claim, note in false_ones))  # fmt: skip
-    second = by_sympy.refusal(block, [[line.text for line in step.certificate] for step in steps], comparisons)
-    steps += [StepRecord(number_line(*each), refusal="" if each.is_true else f"'{each.says}' is false")
-              for each in comparisons]  # fmt: skip
+    twins = (
+        *(_twin(entry, statement) for entry in block.all("twin")),
+        *(
+            Refutation(title, number_line(*claim), (), note, not claim.is_true)
+            for title, claim, note in false_ones
+        ),
+    )
+    second = by_sympy.refusal(
+        block, [[line.text for line in step.certificate] for step in steps], comparisons
+    )
+    steps += [
+        StepRecord(number_line(*each), refusal="" if each.is_true else f"'{each.says}' is false")
+        for each in comparisons
+    ]
     problems = [f"step refused: {step.refusal}" for step in steps if not step.accepted]
-    problems += [f"not shown: {refutation.title}" for refutation in (*needed, *twins) if not refutation.refuted]
+    problems += [
+        f"not shown: {refutation.title}"
+        for refutation in (*needed, *twins)
+        if not refutation.refuted
+    ]
     problems += [f"SymPy refuses a step: {second}"] if second else []
-    problems += [f"hypothesis never used: {fact.name}" for fact in statement.given if fact.name not in known.used]
+    problems += [
+        f"hypothesis never used: {fact.name}"
+        for fact in statement.given
+        if fact.name not in known.used
+    ]
     problems += [] if twins else ["no wrong twin"]
-    if statement.given and not all_hold([*statement.given, *statement.conclusions], statement.case("")):
+    if statement.given and not all_hold(
+        [*statement.given, *statement.conclusions], statement.case("")
+    ):
         problems.append("no exact case satisfies the hypotheses and the conclusions")
     (title,), (source,), (says,) = (block.prose(key) for key in ("title", "source", "says"))
     return ProofRecord(
-        name=block.name, title=title, source=source, statement=says,
-        hypotheses=tuple(map(fact_line, statement.given)), definitions=tuple(map(fact_line, statement.definitions)),
-        steps=tuple(steps), conclusions=tuple(map(fact_line, statement.conclusions)), needed=needed, twins=twins,
-        remarks=block.prose("remark"), assumed=block.prose("assumed"), measured=block.prose("measured"),
-        problems=tuple(problems), seconds=time.perf_counter() - started, sympy=NO if second else YES,
-    )  # fmt: skip
+        name=block.name,
+        title=title,
+        source=source,
+        statement=says,
+        hypotheses=tuple(map(fact_line, statement.given)),
+        definitions=tuple(map(fact_line, statement.definitions)),
+        steps=tuple(steps),
+        conclusions=tuple(map(fact_line, statement.conclusions)),
+        needed=needed,
+        twins=twins,
+        remarks=block.prose("remark"),
+        assumed=block.prose("assumed"),
+        measured=block.prose("measured"),
+        problems=tuple(problems),
+        seconds=time.perf_counter() - started,
+        sympy=NO if second else YES,
+    )
 
 
 def _checked(task: Task, known: Known) -> StepRecord:
     claim, because = fact_line(task.claim), task.entry.note
     try:
-        step = (infer(task.claim, task.method, known) if task.method else
-                prove(task.claim, known, task.terms, task.cofactors))  # fmt: skip
+        step = (
+            infer(task.claim, task.method, known)
+            if task.method
+            else prove(task.claim, known, task.terms, task.cofactors)
+        )
     except Refused as error:
         return StepRecord(claim, because, refusal=str(error))
     lines = step_lines(step, known)
@@ -73,14 +108,25 @@ def _needed(entry: Entry, dropped: list[Fact], statement: Statement) -> Refutati
     false = [fact for fact in statement.conclusions if not holds(fact, case)]
     refuted = bool(entry.case and false) and all_hold(others, case) and not all_hold(dropped, case)
     title = "false without " + " and ".join(f"'{fact.name}'" for fact in dropped)
-    return Refutation(title, fact_line([*false, *statement.conclusions][0]), case_lines(case, statement.names),
-                      entry.note, refuted)  # fmt: skip
+    return Refutation(
+        title,
+        fact_line([*false, *statement.conclusions][0]),
+        case_lines(case, statement.names),
+        entry.note,
+        refuted,
+    )
 
 
 def _twin(entry: Entry, statement: Statement) -> Refutation:
-    """Check that the case satisfies every hypothesis and breaks the twin's claim, as the kernel and SymPy read it."""
+    """Check that the case satisfies every hypothesis and breaks the twin's claim, as the kernel and
+    SymPy read it."""
     title, _, words = entry.words.partition(" :: ")
     claim, case = statement.reader.fact(entry.formula, words), statement.case(entry.case)
-    refuted = all_hold(statement.given, case) and not holds(claim, case) and not by_sympy.holds(
-        statement.block, entry.formula, case)
-    return Refutation(title, fact_line(claim), case_lines(case, statement.names), entry.note, refuted)
+    refuted = (
+        all_hold(statement.given, case)
+        and not holds(claim, case)
+        and not by_sympy.holds(statement.block, entry.formula, case)
+    )
+    return Refutation(
+        title, fact_line(claim), case_lines(case, statement.names), entry.note, refuted
+    )

@@ -1,4 +1,5 @@
-"""Checked proofs as plain records, and formulas and proofs as text and as LaTeX that latex2mathml can convert."""
+"""Checked proofs as plain records, and formulas and proofs as text and as LaTeX that latex2mathml
+can convert."""
 
 from __future__ import annotations
 
@@ -29,7 +30,8 @@ class Line:
 
 @dataclass(frozen=True)
 class StepRecord:
-    """A checked step: claim, reason, certificate term by term, and why the check refused it, if it did."""
+    """A checked step: claim, reason, certificate term by term, and why the check refused it, if it
+    did."""
 
     claim: Line
     because: str = ""
@@ -71,7 +73,9 @@ class ProofRecord:
     measured: tuple[str, ...]
     problems: tuple[str, ...]
     seconds: float = field(compare=False)
-    sympy: str = NOT_APPLICABLE  # whether SymPy accepts the proof too: YES, NO, or why there is no answer
+    sympy: str = (
+        NOT_APPLICABLE  # whether SymPy accepts the proof too: YES, NO, or why there is no answer
+    )
 
     @property
     def holds(self) -> bool:
@@ -83,15 +87,27 @@ class ProofRecord:
 
     def as_text(self) -> str:
         """Return the whole proof as plain text, readable without the code."""
-        lines = [f"{self.title}   [{self.name}]", self.source,
-                 f"verdict: {self.verdict}   ({1e3 * self.seconds:.0f} ms)",
-                 *(f"  open: {problem}" for problem in self.problems), "", "STATEMENT", f"  {plain(self.statement)}"]
+        lines = [
+            f"{self.title}   [{self.name}]",
+            self.source,
+            f"verdict: {self.verdict}   ({1e3 * self.seconds:.0f} ms)",
+            *(f"  open: {problem}" for problem in self.problems),
+            "",
+            "STATEMENT",
+            f"  {plain(self.statement)}",
+        ]
         for title, rows in (
             ("HYPOTHESES", map(_formula, self.hypotheses)),
             ("NOTATION", map(_formula, self.definitions)),
             ("CONCLUSIONS", map(_formula, self.conclusions)),
-            ("PROOF", (row for number, step in enumerate(self.steps, 1) for row in _step(number, step))),
-            ("EACH HYPOTHESIS IS NEEDED", (row for case in self.needed for row in _refutation(case))),
+            (
+                "PROOF",
+                (row for number, step in enumerate(self.steps, 1) for row in _step(number, step)),
+            ),
+            (
+                "EACH HYPOTHESIS IS NEEDED",
+                (row for case in self.needed for row in _refutation(case)),
+            ),
             ("FALSE VARIANTS", (row for twin in self.twins for row in _refutation(twin))),
             ("ASSUMED ABOUT ROUNDING", map(plain, self.assumed)),
             ("MEASURED ON THE COMPILED CODE", map(plain, self.measured)),
@@ -103,19 +119,67 @@ class ProofRecord:
 
 
 _SYMBOLS = {
-    r"\top": "T", r"\dagger": "†", r"\leq": "≤", r"\geq": "≥", r"\succeq": "⪰", r"\succ": "≻", r"\in": "∈",
-    r"\tfrac12": "½", r"\frac12": "½", r"\cdot": "·", r"\bar": "bar ", r"\neq": "≠", r"\perp": "⊥", r"\sum": "Σ",
-    r"\sqrt": "√", r"\dot": "dot ", r"\,": " ", r"\;": " ", r"\|": "‖", r"\partial": "∂", r"\approx": "≈",
-    r"\times": "×", r"\max": "max", r"\alpha": "α", r"\beta": "β", r"\gamma": "γ", r"\delta": "δ", r"\Delta": "Δ",
-    r"\epsilon": "ε", r"\kappa": "κ", r"\lambda": "λ", r"\sigma": "σ", r"\mu": "μ", r"\rho": "ρ", r"\tau": "τ",
-    r"\eta": "η", r"\omega": "ω", r"\varphi": "φ", r"\Phi": "Φ", r"\Lambda": "Λ",
-}  # fmt: skip
-_GREEK = {mark: latex for latex, mark in _SYMBOLS.items() if mark.isalpha() and not mark.isascii() and mark != "Σ"}
+    r"\top": "T",
+    r"\dagger": "†",
+    r"\leq": "≤",
+    r"\geq": "≥",
+    r"\succeq": "⪰",
+    r"\succ": "≻",
+    r"\in": "∈",
+    r"\tfrac12": "½",
+    r"\frac12": "½",
+    r"\cdot": "·",
+    r"\bar": "bar ",
+    r"\neq": "≠",
+    r"\perp": "⊥",
+    r"\sum": "Σ",
+    r"\sqrt": "√",
+    r"\dot": "dot ",
+    r"\,": " ",
+    r"\;": " ",
+    r"\|": "‖",
+    r"\partial": "∂",
+    r"\approx": "≈",
+    r"\times": "×",
+    r"\max": "max",
+    r"\alpha": "α",
+    r"\beta": "β",
+    r"\gamma": "γ",
+    r"\delta": "δ",
+    r"\Delta": "Δ",
+    r"\epsilon": "ε",
+    r"\kappa": "κ",
+    r"\lambda": "λ",
+    r"\sigma": "σ",
+    r"\mu": "μ",
+    r"\rho": "ρ",
+    r"\tau": "τ",
+    r"\eta": "η",
+    r"\omega": "ω",
+    r"\varphi": "φ",
+    r"\Phi": "Φ",
+    r"\Lambda": "Λ",
+}
+_GREEK = {
+    mark: latex
+    for latex, mark in _SYMBOLS.items()
+    if mark.isalpha() and not mark.isascii() and mark != "Σ"
+}
 _RAISED = {"⁻¹": "-1", "⁺": "+", "⁻": "-", "†": r"\dagger"}
 _LOWERED = dict(zip("₀₁₂₃₄₅₆₇₈₉ₙₑₕₖₜₛᵣᵢ", "0123456789nehktsri", strict=True))
 _MARKS = {"ᵀ": r"\top", "²": "2", "³": "3", "⁴": "4"}
-_OPERATORS = {"+": "+", "−": "-", "=": "=", "≠": r"\neq", "<": "<", "≤": r"\leq", ">": ">", "≥": r"\geq",
-              "⪰": r"\succeq", "≻": r"\succ"}  # fmt: skip
+_OPERATORS = {
+    "+": "+",
+    "−": "-",
+    "=": "=",
+    "≠": r"\neq",
+    "<": "<",
+    "≤": r"\leq",
+    ">": ">",
+    "≥": r"\geq",
+    "⪰": r"\succeq",
+    "≻": r"\succ",
+}
 _LONG = 60  # characters of a rational that is still written out
 
 
@@ -133,7 +197,9 @@ def plain(prose: str) -> str:
 def latex(formula: str) -> str:
     """Return the LaTeX form of a printed formula, or of a value such as M = [1 0; 0 1]."""
     if value := re.fullmatch(r"(\S+) = \[([^\[\]]*)\]", formula):
-        body = r" \\ ".join(" & ".join(map(_latex_part, row.split())) for row in value[2].split("; "))
+        body = r" \\ ".join(
+            " & ".join(map(_latex_part, row.split())) for row in value[2].split("; ")
+        )
         return f"{_latex_part(value[1])} = \\begin{{pmatrix}} {body} \\end{{pmatrix}}"
     pieces: list[str] = []
     for chunk in formula.replace(" · ", " ").split():
@@ -146,13 +212,16 @@ def latex(formula: str) -> str:
 
 def _latex_part(chunk: str) -> str:
     """Return one number or name in LaTeX, such as −1/2, M⁻¹ᵀ or γ⁺, with the brackets around it."""
-    opening, name, mark, closing = re.fullmatch(r"([(\[−-]*)(.*?)([ᵀ²³⁴]?)([)\]]*)", chunk).groups()  # type: ignore[union-attr]
+    found = re.fullmatch(r"([(\[−-]*)(.*?)([ᵀ²³⁴]?)([)\]]*)", chunk)
+    opening, name, mark, closing = found.groups()  # type: ignore[union-attr]
     upper = "".join(_RAISED[each] for each in re.findall("|".join(_RAISED), name))
     name = re.sub(r"(\d+)/(\d+)", r"\\frac{\1}{\2}", re.sub("|".join(_RAISED), "", name))
     lower = "".join(_LOWERED.get(each, "") for each in name)
     base = "".join(_GREEK.get(each, each) for each in name if each not in _LOWERED)
     base += (f"_{{{lower}}}" if lower else "") + (f"^{{{upper}}}" if upper else "")
-    return opening.replace("−", "-") + (f"{{{base}}}^{{{_MARKS[mark]}}}" if mark else base) + closing
+    return (
+        opening.replace("−", "-") + (f"{{{base}}}^{{{_MARKS[mark]}}}" if mark else base) + closing
+    )
 
 
 def fact_line(fact: Fact) -> Line:
@@ -161,25 +230,39 @@ def fact_line(fact: Fact) -> Line:
 
 
 def number_line(says: str, left: Fraction, relation: str, right: Fraction) -> Line:
-    """Return a comparison of two rationals as a line; a long rational is written as its decimal value."""
+    """Return a comparison of two rationals as a line; a long rational is written as its decimal
+    value."""
     both = [str(each).replace("-", "−") for each in (left, right)]
-    first, second = (each if len(each) <= _LONG else f"{float(value):.6g} (exact rational of {len(each)} characters)"
-                     for each, value in zip(both, (left, right), strict=True))  # fmt: skip
+    first, second = (
+        each
+        if len(each) <= _LONG
+        else f"{float(value):.6g} (exact rational of {len(each)} characters)"
+        for each, value in zip(both, (left, right), strict=True)
+    )
     return Line(says, f"{first} {relation} {second}")
 
 
 def step_lines(step: Step, known: Known) -> tuple[Line, ...]:
-    """Return the certificate of a step, term by term, with the facts that make a term non-negative or zero."""
+    """Return the certificate of a step, term by term, with the facts that make a term non-negative
+    or zero."""
     if step.sources:
         return (Line("from " + " and ".join(f"'{fact.name}'" for fact in step.sources)),)
     lines = []
     for factors in step.terms:
         names = " and ".join(f"'{fact.name}'" for fact in reasons(factors, known))
-        lines.append(Line(f"non-negative by {names}" if names else "a square", " · ".join(map(_bracketed, factors))))
+        lines.append(
+            Line(
+                f"non-negative by {names}" if names else "a square",
+                " · ".join(map(_bracketed, factors)),
+            )
+        )
     for left, fact, right in step.cofactors:
         one, other = str(fact).split(" = ")
-        parts = [*[_bracketed(left)] * (left != ONE), f"[{one} − {_bracketed(other)}]",
-                 *[_bracketed(right)] * (right != ONE)]  # fmt: skip
+        parts = [
+            *[_bracketed(left)] * (left != ONE),
+            f"[{one} − {_bracketed(other)}]",
+            *[_bracketed(right)] * (right != ONE),
+        ]
         lines.append(Line(f"by '{fact.name}'", " · ".join(parts)))
     return tuple(lines)
 
@@ -192,8 +275,14 @@ def _bracketed(value: Expression | str) -> str:
 
 def case_lines(case: Case, names: Mapping[str, Expression]) -> tuple[Line, ...]:
     """Return an exact case as one line per letter."""
-    rows = {name: "; ".join(" ".join(map(str, row)) for row in value.tolist()) for name, value in case.items()}
-    return tuple(Line("", f"{name} = {row if names[name].rows == ANY else f'[{row}]'}") for name, row in rows.items())
+    rows = {
+        name: "; ".join(" ".join(map(str, row)) for row in value.tolist())
+        for name, value in case.items()
+    }
+    return tuple(
+        Line("", f"{name} = {row if names[name].rows == ANY else f'[{row}]'}")
+        for name, row in rows.items()
+    )
 
 
 def _formula(line: Line) -> str:
@@ -201,17 +290,25 @@ def _formula(line: Line) -> str:
 
 
 def _step(number: int, step: StepRecord) -> list[str]:
-    rows = [f"{number}. {_formula(step.claim)}" + ("" if step.accepted else "   REFUSED: " + step.refusal)]
+    rows = [
+        f"{number}. {_formula(step.claim)}"
+        + ("" if step.accepted else "   REFUSED: " + step.refusal)
+    ]
     rows += [f"     {plain(step.because)}"] if step.because else []
     if any(line.text for line in step.certificate):
         rows.append("     certificate (the difference of both sides, or the value, is the sum of):")
-    return rows + [f"       {line.text}   [{line.words}]" if line.text else f"     {line.words}"
-                   for line in step.certificate]  # fmt: skip
+    return rows + [
+        f"       {line.text}   [{line.words}]" if line.text else f"     {line.words}"
+        for line in step.certificate
+    ]
 
 
 def _refutation(refutation: Refutation) -> list[str]:
     verdict = "refuted" if refutation.refuted else "NOT REFUTED"
-    rows = [f"{plain(refutation.title)}: {verdict}", f"     false claim: {_formula(refutation.claim)}"]
+    rows = [
+        f"{plain(refutation.title)}: {verdict}",
+        f"     false claim: {_formula(refutation.claim)}",
+    ]
     case = ",  ".join(line.text for line in refutation.case)
     rows += [f"     exact case:  {case}"] if case else []
     return rows + ([f"     {plain(refutation.note)}"] if refutation.note else [])

@@ -27,8 +27,9 @@ class Task:
 class Statement:
     """A statement as the kernel reads it.
 
-    `given` holds the facts of each hypothesis, `definitions` name expressions and assume nothing, `tasks` are the
-    steps. `cases` are exact values; the one named "" satisfies every hypothesis, so the theorem is not vacuous.
+    `given` holds the facts of each hypothesis, `definitions` name expressions and assume nothing,
+    `tasks` are the steps. `cases` are exact values; the one named "" satisfies every hypothesis, so
+    the theorem is not vacuous.
     """
 
     def __init__(self, block: Block) -> None:
@@ -45,7 +46,9 @@ class Statement:
             new = names_in(definition.lhs)
             taken |= names_in(definition.rhs)
             if len(new) != 1 or definition.lhs != self.names[min(new)] or new & taken:
-                raise ArgumentError("where", definition.name, "one letter that its right side and earlier ones lack")
+                raise ArgumentError(
+                    "where", definition.name, "one letter that its right side and earlier ones lack"
+                )
             taken |= new
         self.tasks: list[Task] = []
         for entry in block.all("lemma", "show", "sum", "by"):
@@ -58,7 +61,9 @@ class Statement:
     def case(self, text: str) -> Case:
         """Return the values of a case, with those of the definitions."""
         name, _, values = text.rpartition(":")
-        return completed(read_case(values, self.block.shapes, self.cases.get(name, {})), self.definitions)
+        return completed(
+            read_case(values, self.block.shapes, self.cases.get(name, {})), self.definitions
+        )
 
     def _facts(self, entry: Entry) -> list[Fact]:
         return [self.reader.fact(each, entry.words) for each in entry.formula.split(";")]
@@ -72,11 +77,14 @@ class Statement:
             self.tasks[-1].cofactors += map(_cofactor, self.reader.products(entry.formula))
         else:
             terms = self.reader.products(entry.formula)
-            self.tasks[-1].terms += [tuple(x for x in term if isinstance(x, Expression)) for term in terms]
+            self.tasks[-1].terms += [
+                tuple(x for x in term if isinstance(x, Expression)) for term in terms
+            ]
 
 
 def _cofactor(factors: Product) -> Cofactor:
-    """Return what stands left of the equation in square brackets, the equation, and what stands right of it."""
+    """Return what stands left of the equation in square brackets, the equation, and what stands
+    right of it."""
     at = [i for i, each in enumerate(factors) if isinstance(each, Fact)]
     if len(at) != 1:
         raise Refused("a cofactor has one equation in square brackets")

@@ -1,9 +1,10 @@
 """Words of matrix letters, facts about them, and the reader of formulas as text.
 
-An `Expression` is a finite sum  coefficient * scalars * word.  A word is a product of letters, which do not commute
-(matrices of a *named* size such as c x d, never a number); the scalars (e, α, ...) commute. Two expressions are equal
-only if they have the same terms; no simplifier, numeric size or sample is used. A product with unequal inner sizes
-raises an error, and so does a sum of different shapes.
+An `Expression` is a finite sum  coefficient * scalars * word.  A word is a product of letters,
+which do not commute (matrices of a *named* size such as c x d, never a number); the scalars (e, α,
+...) commute. Two expressions are equal only if they have the same terms; no simplifier, numeric
+size or sample is used. A product with unequal inner sizes raises an error, and so does a sum of
+different shapes.
 
 One rule goes beyond the free algebra: a 1 x 1 product equals its own transpose (`vanishes`).
 """
@@ -26,7 +27,8 @@ _POWERS = "⁰¹²³⁴⁵⁶⁷⁸⁹"
 
 
 class Letter(NamedTuple):
-    """A matrix (or vector) as a letter: its name, the names of its sizes, and whether it is transposed."""
+    """A matrix (or vector) as a letter: its name, the names of its sizes, and whether it is
+    transposed."""
 
     name: str
     rows: str
@@ -51,17 +53,27 @@ class Expression:
         shapes = {(part.rows, part.cols) for part in (self, other) if part.terms}
         sized = shapes - {(ANY, ANY)}
         if len(sized) > 1 or (len(shapes) > 1 and any(rows != cols for rows, cols in sized)):
-            raise ArgumentError("sum", f"{self.rows}x{self.cols} + {other.rows}x{other.cols}", "equal shapes")
-        return _collected([*self.terms.items(), *other.terms.items()], *next(iter(sized), (ANY, ANY)))
+            raise ArgumentError(
+                "sum", f"{self.rows}x{self.cols} + {other.rows}x{other.cols}", "equal shapes"
+            )
+        return _collected(
+            [*self.terms.items(), *other.terms.items()], *next(iter(sized), (ANY, ANY))
+        )
 
     def __mul__(self, other: Expression) -> Expression:
         if ANY not in (self.cols, other.rows) and self.cols != other.rows:
             shapes = f"{self.rows}x{self.cols} times {other.rows}x{other.cols}"
             raise ArgumentError("product", shapes, "inner sizes that agree")
-        terms = [((tuple(sorted(scalars + more)), word + next_word), k * factor)
-                 for (scalars, word), k in self.terms.items() for (more, next_word), factor in other.terms.items()]
-        return _collected(terms, other.rows if self.rows == ANY else self.rows,
-                          self.cols if other.cols == ANY else other.cols)
+        terms = [
+            ((tuple(sorted(scalars + more)), word + next_word), k * factor)
+            for (scalars, word), k in self.terms.items()
+            for (more, next_word), factor in other.terms.items()
+        ]
+        return _collected(
+            terms,
+            other.rows if self.rows == ANY else self.rows,
+            self.cols if other.cols == ANY else other.cols,
+        )
 
     def __neg__(self) -> Expression:
         return number(-1) * self
@@ -72,7 +84,9 @@ class Expression:
     @cached_property
     def T(self) -> Expression:
         """The transpose: every word is reversed and every letter flipped."""
-        return Expression({(s, transposed(w)): k for (s, w), k in self.terms.items()}, self.cols, self.rows)
+        return Expression(
+            {(s, transposed(w)): k for (s, w), k in self.terms.items()}, self.cols, self.rows
+        )
 
     @property
     def is_number(self) -> bool:
@@ -85,16 +99,22 @@ class Expression:
 
     def ordered(self) -> list[tuple[Term, Fraction]]:
         """Return the terms in a fixed order, short words first."""
-        return sorted(self.terms.items(), key=lambda item: (len(item[0][1]), item[0][0], item[0][1]))
+        return sorted(
+            self.terms.items(), key=lambda item: (len(item[0][1]), item[0][0], item[0][1])
+        )
 
     def __str__(self) -> str:
         """Return the sum as text on one line, which the reader reads again."""
         pieces: list[str] = []
-        unit = [] if self.rows in (ANY, "1") else ["I"]  # a bare number among matrices is a multiple of the identity
+        unit = (
+            [] if self.rows in (ANY, "1") else ["I"]
+        )  # a bare number among matrices is a multiple of the identity
         for (scalars, word), coefficient in self.ordered():
             counts = [(name, len(list(group))) for name, group in groupby(scalars)]
-            factors = [name + ("" if power == 1 else "".join(_POWERS[int(digit)] for digit in str(power)))
-                       for name, power in counts]
+            factors = [
+                name + ("" if power == 1 else "".join(_POWERS[int(digit)] for digit in str(power)))
+                for name, power in counts
+            ]
             factors += [each.name + "ᵀ" * each.flipped for each in word] or unit
             size = [] if abs(coefficient) == 1 and factors else [str(abs(coefficient))]
             sign = "−" if coefficient < 0 else "+" if pieces else ""
@@ -123,8 +143,11 @@ def letter(name: str, rows: str = ANY, cols: str = ANY) -> Expression:
 
 
 def of_word(word: Word, scalars: Scalars = (), coefficient: Fraction = Fraction(1)) -> Expression:
-    """Return an expression of one term; the first and the last letter of the word give its shape."""
-    return Expression({(scalars, word): coefficient}, *((word[0].rows, word[-1].cols) if word else (ANY, ANY)))
+    """Return an expression of one term; the first and the last letter of the word give its
+    shape."""
+    return Expression(
+        {(scalars, word): coefficient}, *((word[0].rows, word[-1].cols) if word else (ANY, ANY))
+    )
 
 
 def product(factors: Iterable[Expression]) -> Expression:
@@ -134,20 +157,25 @@ def product(factors: Iterable[Expression]) -> Expression:
 
 def transposed(word: Word) -> Word:
     """Return the word reversed, with every letter flipped."""
-    return tuple(Letter(each.name, each.cols, each.rows, not each.flipped) for each in reversed(word))
+    return tuple(
+        Letter(each.name, each.cols, each.rows, not each.flipped) for each in reversed(word)
+    )
 
 
 def names_in(value: Expression) -> set[str]:
     """Return the names of all letters and scalars in the expression."""
-    return {name for scalars, word in value.terms for name in (*scalars, *(each.name for each in word))}
+    return {
+        name for scalars, word in value.terms for name in (*scalars, *(each.name for each in word))
+    }
 
 
 @dataclass(frozen=True)
 class Fact:
-    """A relation for all values of the letters that satisfy the other facts; all but an equation compare with 0.
+    """A relation for all values of the letters that satisfy the other facts; all but an equation
+    compare with 0.
 
-    = equal, ≠ a scalar that is not 0, ≥ a number or every entry of a matrix is not negative, ⪰ x' value x >= 0 for
-    every x, ≻ the same with > for every x other than 0.
+    = equal, ≠ a scalar that is not 0, ≥ a number or every entry of a matrix is not negative, ⪰ x'
+    value x >= 0 for every x, ≻ the same with > for every x other than 0.
     """
 
     name: str
@@ -169,7 +197,10 @@ class Fact:
         return self.relation == "≥" and not self.difference.is_number
 
     def __str__(self) -> str:
-        identity = self.rhs == ONE and self.lhs.rows not in (ANY, "1")  # then 1 stands for the identity matrix
+        identity = self.rhs == ONE and self.lhs.rows not in (
+            ANY,
+            "1",
+        )  # then 1 stands for the identity matrix
         return f"{self.lhs} {self.relation} {'I' if identity else self.rhs}"
 
 
@@ -179,9 +210,11 @@ Product = tuple[Expression | Fact, ...]
 
 
 class Reader:
-    """Reads formulas whose names are letters, scalars or abbreviations, each given by its expression.
+    """Reads formulas whose names are letters, scalars or abbreviations, each given by its
+    expression.
 
-    A product is written without a sign, ᵀ transposes, I is the identity; [a = b] in a product stands for a − b.
+    A product is written without a sign, ᵀ transposes, I is the identity; [a = b] in a product
+    stands for a − b.
     """
 
     def __init__(self, names: Mapping[str, Expression]) -> None:
@@ -246,5 +279,7 @@ class Reader:
 
 
 def _total(products: Iterable[Product]) -> Expression:
-    parts = (product(x.difference if isinstance(x, Fact) else x for x in factors) for factors in products)
+    parts = (
+        product(x.difference if isinstance(x, Fact) else x for x in factors) for factors in products
+    )
     return reduce(Expression.__add__, parts)

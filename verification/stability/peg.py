@@ -1,4 +1,5 @@
-"""The peg of Figure 4 in the loop of the device: when it comes to rest, and how often it bounces."""
+"""The peg of Figure 4 in the loop of the device: when it comes to rest, and how often it
+bounces."""
 
 from __future__ import annotations
 
@@ -14,18 +15,24 @@ from verification.scenes.measures import bounces, deepest_penetration, settling_
 from verification.table import Table
 
 SCENE = "peg_corner"
-STIFFNESSES = {"quick": (500.0, 1000.0, 4000.0, 16000.0), "full": (250.0, 500.0, 1e3, 2e3, 4e3, 8e3, 16e3, 32e3)}
+STIFFNESSES = {
+    "quick": (500.0, 1000.0, 4000.0, 16000.0),
+    "full": (250.0, 500.0, 1e3, 2e3, 4e3, 8e3, 16e3, 32e3),
+}
 DAMPINGS = {"quick": (0.0, 50.0, 200.0), "full": (0.0, 12.5, 25.0, 50.0, 100.0, 200.0, 400.0)}
 # name: (rate [Hz], device), which emulate the paper's experiments as in the report's device runs
 LATE: dict[str, Any] = {"device.delay": 1, "device.position_resolution": [1e-6, 1e-6, 1e-5]}
 DEVICES: dict[str, tuple[float, dict[str, Any]]] = {
-    "512 Hz": (512.0, {}), "512 Hz, late sensors": (512.0, LATE),
-    "1 kHz": (1000.0, {}), "1 kHz, late sensors": (1000.0, LATE),
+    "512 Hz": (512.0, {}),
+    "512 Hz, late sensors": (512.0, LATE),
+    "1 kHz": (1000.0, {}),
+    "1 kHz, late sensors": (1000.0, LATE),
 }
 
 
 def _contacts(study: Study, case: tuple[str, float, float]) -> Iterator[dict[str, Any]]:
-    """Yield the row of a device and a wall with penalties, then with impulses; runs may be incomplete."""
+    """Yield the row of a device and a wall with penalties, then with impulses; runs may be
+    incomplete."""
     device, K, B = case
     rate, sensors = DEVICES[device]
     values = {"rate": rate, "contact.stiffness": K, "contact.damping": B, **sensors}
@@ -34,33 +41,55 @@ def _contacts(study: Study, case: tuple[str, float, float]) -> Iterator[dict[str
         run = study.run(changed, world, keep=False, partial=True)
         trace = trace_of(run)
         yield {
-            "device": device, "stiffness [N/m]": K, "damping [N s/m]": B, "world": run.world,
-            "settles after [s]": settling_time(trace) if run.complete else None, "bounces": bounces(trace),
-            "penetration [mm]": 1e3 * deepest_penetration(trace), "run stopped because": run.stopped,
+            "device": device,
+            "stiffness [N/m]": K,
+            "damping [N s/m]": B,
+            "world": run.world,
+            "settles after [s]": settling_time(trace) if run.complete else None,
+            "bounces": bounces(trace),
+            "penetration [mm]": 1e3 * deepest_penetration(trace),
+            "run stopped because": run.stopped,
         }
 
 
 def peg(pegs: Table) -> tuple[Part, Part]:
-    """Return the parts on whether the peg comes to rest no later, and bounces no more often, with impulses.
+    """Return the parts on whether the peg comes to rest no later, and bounces no more often, with
+    impulses.
 
     A wall at which the peg rests under neither law gives no outcome.
     """
     rows = pegs.records()
     pairs = list(zip(rows[::2], rows[1::2], strict=True))
-    times = [tuple(np.inf if row["settles after"] is None else row["settles after"] for row in pair) for pair in pairs]
+    times = [
+        tuple(np.inf if row["settles after"] is None else row["settles after"] for row in pair)
+        for pair in pairs
+    ]
     sooner = [None if np.isinf(min(pair)) else bool(pair[1] <= pair[0]) for pair in times]
     fewer = [bool(ours["bounces"] <= theirs["bounces"]) for theirs, ours in pairs]
     return (
-        Part.of("The peg in the corner comes to rest no later with impulses than with springs alone",
-                f"in {sooner.count(True)} of {len(sooner) - sooner.count(None)} combinations of device and wall at "
-                "which the peg comes to rest with either law or both", "in all", verdict_of_trials(sooner)),
-        Part.of("The peg in the corner bounces no more often with impulses than with springs alone",
-                f"in {sum(fewer)} of {len(fewer)} combinations of device and wall", "in all", verdict_of_trials(fewer)),
-    )  # fmt: skip
+        Part.of(
+            "The peg in the corner comes to rest no later with impulses than with springs alone",
+            f"in {sooner.count(True)} of {len(sooner) - sooner.count(None)} combinations of "
+            f"device and wall at "
+            "which the peg comes to rest with either law or both",
+            "in all",
+            verdict_of_trials(sooner),
+        ),
+        Part.of(
+            "The peg in the corner bounces no more often with impulses than with springs alone",
+            f"in {sum(fewer)} of {len(fewer)} combinations of device and wall",
+            "in all",
+            verdict_of_trials(fewer),
+        ),
+    )
 
 
 PEG = Check(
-    key="peg", question="Does the peg come to rest no later with impulses than with penalties?",
-    cases=lambda study: product(DEVICES, STIFFNESSES[study.depth], DAMPINGS[study.depth]), row=_contacts, says=peg,
-    digits=3, note="A dash: the peg never came to rest. Late: as in the loops above, with angles rounded to 10 µrad.",
+    key="peg",
+    question="Does the peg come to rest no later with impulses than with penalties?",
+    cases=lambda study: product(DEVICES, STIFFNESSES[study.depth], DAMPINGS[study.depth]),
+    row=_contacts,
+    says=peg,
+    digits=3,
+    note="A dash: the peg never came to rest. Late: as in the loops above, with angles rounded to 10 µrad.",
 )

@@ -1,4 +1,5 @@
-"""Topic: the stability of sampled contact with penalties and impulses (C20, C21), and its rate-hardness."""
+"""Topic: the stability of sampled contact with penalties and impulses (C20, C21), and its
+rate-hardness."""
 
 from __future__ import annotations
 
@@ -31,8 +32,11 @@ def _maps(study: Study, loop: Loop) -> tuple[Contact, Contact]:
 
 
 def _loop(loop: Loop) -> Row:
-    return {"rate [Hz]": loop.rate, "sensors": "late" if loop.delay else "ideal",
-            "device damping [N s/m]": loop.device_damping}
+    return {
+        "rate [Hz]": loop.rate,
+        "sensors": "late" if loop.delay else "ideal",
+        "device damping [N s/m]": loop.device_damping,
+    }
 
 
 def _marks(study: Study, loop: Loop) -> Iterator[Row]:
@@ -40,14 +44,21 @@ def _marks(study: Study, loop: Loop) -> Iterator[Row]:
     both = [one.outcomes for one in _maps(study, loop)]
     for i, K in enumerate(grid(study.depth)[0]):
         marks = ["".join(one[:, i]) for one in both]
-        yield {**_loop(loop), "stiffness [N/m]": float(K),
-               "passive up to [N s/m]": max(float(loop.passive_damping(K)), 0.0),
-               "penalties": marks[0], "impulses": marks[1]}
+        yield {
+            **_loop(loop),
+            "stiffness [N/m]": float(K),
+            "passive up to [N s/m]": max(float(loop.passive_damping(K)), 0.0),
+            "penalties": marks[0],
+            "impulses": marks[1],
+        }
 
 
 def _of_maps(table: Table) -> Iterator[Part]:
-    """Yield the parts on stable walls, on the condition b >= KT/2 + |B|, and on a device without damping."""
-    theirs, ours = (np.array([list(marks) for marks in table.column(law)]) for law in ("penalties", "impulses"))
+    """Yield the parts on stable walls, on the condition b >= KT/2 + |B|, and on a device without
+    damping."""
+    theirs, ours = (
+        np.array([list(marks) for marks in table.column(law)]) for law in ("penalties", "impulses")
+    )
     damping = next(grid(depth)[1] for depth in GRIDS if GRIDS[depth][1] == theirs.shape[1])
     yield _held(table, theirs == SETTLES, ours == SETTLES, damping == PAPER_DAMPING)
     rate, b, K = (np.array(table.column(key)) for key in ("rate", "device damping", "stiffness"))
@@ -56,17 +67,28 @@ def _of_maps(table: Table) -> Iterator[Part]:
     damped, bare = ideal & (b > 0.0), ideal & (b == 0.0)
     gains = int((passive & (theirs == GROWS))[damped].sum())
     yield Part.of(
-        "Walls that are passive by Colgate's condition, but at which the motion grows (penalties, ideal sensors, "
+        "Walls that are passive by Colgate's condition, but at which the motion grows (penalties, "
+        "ideal sensors, "
         "device with damping)",
-        f"{gains or 'none'} of {passive[damped].sum()}. {(~passive & (theirs == SETTLES))[damped].sum()} more walls "
-        "are stable although the condition fails: it covers the worst hand, ours is a constant force", "none",
-        REFUTED if gains else REPRODUCED)
-    shares = " and ".join(f"{100 * (theirs == SETTLES)[bare & (rate == one)].mean():.0f} % of the walls at {one:.0f} Hz"
-                          for one in dict.fromkeys(rate[bare].tolist()))
+        f"{gains or 'none'} of {passive[damped].sum()}. "
+        f"{(~passive & (theirs == SETTLES))[damped].sum()} more walls "
+        "are stable although the condition fails: it covers the worst hand, ours is a constant "
+        "force",
+        "none",
+        REFUTED if gains else REPRODUCED,
+    )
+    shares = " and ".join(
+        f"{100 * (theirs == SETTLES)[bare & (rate == one)].mean():.0f} % of the walls at {one:.0f} Hz"
+        for one in dict.fromkeys(rate[bare].tolist())
+    )
     yield Part.of(
-        "Walls that are passive on a device without damping (b = 0, as in the paper), with penalties and ideal "
-        "sensors", f"none: Colgate's condition needs b > 0. Yet {shares} are stable under our constant force", "all",
-        MIXED)
+        "Walls that are passive on a device without damping (b = 0, as in the paper), with "
+        "penalties and ideal "
+        "sensors",
+        f"none: Colgate's condition needs b > 0. Yet {shares} are stable under our constant force",
+        "all",
+        MIXED,
+    )
 
 
 def _held(table: Table, theirs: np.ndarray, ours: np.ndarray, papers: np.ndarray) -> Part:
@@ -74,18 +96,27 @@ def _held(table: Table, theirs: np.ndarray, ours: np.ndarray, papers: np.ndarray
     groups = [[k for k, own in enumerate(loop) if own == one] for one in dict.fromkeys(loop)]
     more = [ours[of].sum() / theirs[of].sum() for of in groups]
     lost, there = int((theirs & ~ours).sum()), int((theirs & ~ours)[:, papers].sum())
-    only = (f"{lost} walls are stable only without impulses, {there or 'none'} of them at the paper's damping of "
-            f"{PAPER_DAMPING:g} N s/m")  # fmt: skip
+    only = (
+        f"{lost} walls are stable only without impulses, {there or 'none'} of them at the paper's "
+        f"damping of "
+        f"{PAPER_DAMPING:g} N s/m"
+    )
     return Part(
-        f"Of {theirs.size:,} walls ({theirs.size // len(groups)} pairs of stiffness and damping in {len(groups)} "
-        f"loops of given rate, sensor and device damping), {ours.sum()} are stable with impulses and {theirs.sum()} "
-        f"without. With impulses, a loop has {min(more):.2f} to {max(more):.2f} times as many. {only}.",
+        f"Of {theirs.size:,} walls ({theirs.size // len(groups)} pairs of stiffness and damping "
+        f"in {len(groups)} "
+        f"loops of given rate, sensor and device damping), {ours.sum()} are stable with impulses "
+        f"and {theirs.sum()} "
+        f"without. With impulses, a loop has {min(more):.2f} to {max(more):.2f} times as many. "
+        f"{only}.",
         REFUTED if min(more) < 1.0 else MIXED if lost else REPRODUCED,
-        asked="Number of stable walls with impulses, and without", target="more with impulses, none only without",
+        asked="Number of stable walls with impulses, and without",
+        target="more with impulses, none only without",
         measured=f"{ours.sum()} of {theirs.size:,} with impulses, {theirs.sum()} without; {only}",
         miss=f"impulses make {lost} of {theirs.size:,} walls unstable ({there or 'none'} at the paper's damping) and "
-             f"{int((ours & ~theirs).sum())} stable"
-        if lost else "")
+        f"{int((ours & ~theirs).sum())} stable"
+        if lost
+        else "",
+    )
 
 
 def _hardness(study: Study, loop: Loop) -> Iterator[Row]:
@@ -95,11 +126,16 @@ def _hardness(study: Study, loop: Loop) -> Iterator[Row]:
     for law, one in zip(LAWS, _maps(study, loop), strict=True):
         for i, K in enumerate(stiffness):
             settling = float(one.settling_time[at, i])
-            yield {**_loop(loop), "law": law, "stiffness [N/m]": float(K),
-                   "rate-hardness [N/m]": float(one.rate_hardness[at, i]),
-                   "settles after [s]": settling if math.isfinite(settling) else None,
-                   "penetration [mm]": 1e3 * float(one.penetration[at, i]), "bounces": int(one.bounces[at, i]),
-                   "peak force [N]": float(one.peak_force[at, i])}
+            yield {
+                **_loop(loop),
+                "law": law,
+                "stiffness [N/m]": float(K),
+                "rate-hardness [N/m]": float(one.rate_hardness[at, i]),
+                "settles after [s]": settling if math.isfinite(settling) else None,
+                "penetration [mm]": 1e3 * float(one.penetration[at, i]),
+                "bounces": int(one.bounces[at, i]),
+                "peak force [N]": float(one.peak_force[at, i]),
+            }
 
 
 def _hard(table: Table) -> Part:
@@ -107,41 +143,68 @@ def _hard(table: Table) -> Part:
     of_law = [table.where(law=law) for law in LAWS]
     size = len(set(table.column("stiffness")))
     harder, deeper = (
-        np.median(np.divide(*(np.array(one.column(key)) for one in of_law[::-1])).reshape(-1, size), axis=1)
+        np.median(
+            np.divide(*(np.array(one.column(key)) for one in of_law[::-1])).reshape(-1, size),
+            axis=1,
+        )
         for key in ("rate-hardness", "penetration")
     )
     return Part.of(
-        "First rise of the force (rate-hardness) and penetration with impulses, relative to penalties, at the paper's "
+        "First rise of the force (rate-hardness) and penetration with impulses, relative to "
+        "penalties, at the paper's "
         f"wall damping of {PAPER_DAMPING:g} N s/m",
-        f"{min(harder):.3g} to {max(harder):.3g} times as hard, {min(deeper):.2f} to {max(deeper):.2f} times as deep "
-        "(a median per loop; range of the loops)", "harder, no deeper",
-        REPRODUCED if min(harder) > 1.0 and max(deeper) <= 1.0 else MIXED)
+        f"{min(harder):.3g} to {max(harder):.3g} times as hard, {min(deeper):.2f} to "
+        f"{max(deeper):.2f} times as deep "
+        "(a median per loop; range of the loops)",
+        "harder, no deeper",
+        REPRODUCED if min(harder) > 1.0 and max(deeper) <= 1.0 else MIXED,
+    )
 
 
 MAPS = Check(
-    key="maps", question="At which walls does the mass come to rest?", cases=lambda study: loops(), row=_marks,
-    says=_of_maps, digits=3, note="Last two columns: one mark per wall damping, from small to large: + the mass comes "
+    key="maps",
+    question="At which walls does the mass come to rest?",
+    cases=lambda study: loops(),
+    row=_marks,
+    says=_of_maps,
+    digits=3,
+    note="Last two columns: one mark per wall damping, from small to large: + the mass comes "
     "to rest, o it keeps bouncing, x its motion grows.",
 )
 DAMPINGS = Check(
-    key="dampings", question="Which dampings do the maps have?", cases=lambda study: grid(study.depth)[1],
+    key="dampings",
+    question="Which dampings do the maps have?",
+    cases=lambda study: grid(study.depth)[1],
     row=lambda study, B: {"damping [N s/m]": float(B)},
 )
 HARDNESS = Check(
-    key="hardness", question="How hard does a wall feel?", cases=lambda study: loops(), row=_hardness, says=_hard,
-    digits=3, note="Wall damping 50 N s/m, as in the paper. Rate-hardness: the rise of the force per second over the "
-    "first step of contact, divided by the approach speed (Lawrence and others, 2000). An impulse is given in one "
-    "step, so its rate-hardness grows with the square of the rate. A limited device renders part of this rise.",
+    key="hardness",
+    question="How hard does a wall feel?",
+    cases=lambda study: loops(),
+    row=_hardness,
+    says=_hard,
+    digits=3,
+    note="Wall damping 50 N s/m, as in the paper. Rate-hardness: the rise of the force per second over the "
+    "first step of contact, divided by the approach speed (Lawrence and others, 2000). An impulse "
+    "is given in one "
+    "step, so its rate-hardness grows with the square of the rate. A limited device renders part "
+    "of this rise.",
 )
 
 contact_stability = Topic(
-    key="stability", title="Stability of contact",
+    key="stability",
+    title="Stability of contact",
     question="A virtual wall in a sampled loop can feed energy to the hand. First, a constant force pushes a mass of 2 "
-    "kg against many walls of stiffness K and damping B. A loop has a rate (512 Hz or 1 kHz), a device damping b, and "
-    "ideal or late sensors: late readings are rounded to 1 µm, and readings and forces each come one step late. A wall "
-    "is stable if the mass comes to rest: in the last quarter of three seconds the mass is slower than 1 mm/s and "
-    "never leaves the wall. Second, the engine pushes the paper's peg into a corner. Third, a hand moves the device, "
-    "and we measure the energy that it draws from the loop. Colgate's condition, b >= KT/2 + |B| with the period T, "
+    "kg against many walls of stiffness K and damping B. A loop has a rate (512 Hz or 1 kHz), a "
+    "device damping b, and "
+    "ideal or late sensors: late readings are rounded to 1 µm, and readings and forces each come "
+    "one step late. A wall "
+    "is stable if the mass comes to rest: in the last quarter of three seconds the mass is slower "
+    "than 1 mm/s and "
+    "never leaves the wall. Second, the engine pushes the paper's peg into a corner. Third, a "
+    "hand moves the device, "
+    "and we measure the energy that it draws from the loop. Colgate's condition, b >= KT/2 + |B| "
+    "with the period T, "
     "makes a wall of spring and damper passive for every hand, if the sensors are ideal.",
     checks=(MAPS, DAMPINGS, HARDNESS, PEG, PORT),
     says=lambda tables, parts: parts[0].sentence if "maps" in tables else "",

@@ -1,10 +1,13 @@
-"""A mass that a hand pushes against a sampled wall: exact motion between the samples, many walls at once.
+"""A mass that a hand pushes against a sampled wall: exact motion between the samples, many walls at
+once.
 
-    m ẍ = F_h − F_k − b ẋ      x > 0 inside the wall; F_k held from sample k to k + 1 (integrated exactly)
+    m ẍ = F_h − F_k − b ẋ      x > 0 inside the wall; F_k held from sample k to k + 1 (integrated
+    exactly)
 
-The wall gets quantised and delayed readings of the position; their difference over one step is the velocity. Under the
-law "penalty" its force is (5), clamped. Under "impulses" the first reading inside the wall causes the impulse (20),
-p = (1 + e) m γ⁻, applied as the force p/T over one step; the following readings cause (5).
+The wall gets quantised and delayed readings of the position; their difference over one step is the
+velocity. Under the law "penalty" its force is (5), clamped. Under "impulses" the first reading
+inside the wall causes the impulse (20), p = (1 + e) m γ⁻, applied as the force p/T over one step;
+the following readings cause (5).
 """
 
 from __future__ import annotations
@@ -17,15 +20,22 @@ from numpy.typing import NDArray
 from reference import Floats
 
 PENALTY, IMPULSES = LAWS = ("penalty", "impulses")
-SETTLES, BOUNCES_ON, GROWS = "+", "o", "x"  # the marks of a wall: the mass settles, keeps bouncing, moves ever more
+SETTLES, BOUNCES_ON, GROWS = (
+    "+",
+    "o",
+    "x",
+)  # the marks of a wall: the mass settles, keeps bouncing, moves ever more
 PAPER_DAMPING = 50.0  # B of the paper's walls [N s/m]
 
 SETTLED_SPEED = 1e-3  # [m/s] as in the claims: a hundredth of the speed at contact
-GROWN = 1.05  # neither rounding nor the hand alone explains speeds above this multiple of the initial speed
-_SMALL = 1e-4  # for smaller c, T − φ suffers from cancellation, and three terms of the series err by c³/6 < 2e-13
+# neither rounding nor the hand alone explains speeds above this multiple of the initial speed
+GROWN = 1.05
+# for smaller c, T − φ suffers from cancellation, and three terms of the series err by c³/6 < 2e-13
+_SMALL = 1e-4
 _LAST = 0.25  # share of the time, at its end, in which a settled mass must be still
 
-# Emulated encoder with a resolution of 1 µm, and a delay of one sample each way, as in the report's device runs.
+# Emulated encoder with a resolution of 1 µm, and a delay of one sample each way, as in the report's
+# device runs.
 LATE = (1, 1e-6)  # delay [samples], resolution [m]
 GRIDS = {"quick": (17, 14), "full": (49, 40)}  # stiffnesses, dampings
 
@@ -34,8 +44,9 @@ GRIDS = {"quick": (17, 14), "full": (49, 40)}  # stiffnesses, dampings
 class Loop:
     """All parameters except those of the walls; SI units.
 
-    rate [Hz], mass [kg], device_damping b [N s/m], push of the hand [N], initial speed and distance from the wall,
-    delay of readings and of forces [samples each], resolution of the sensor [m], restitution
+    rate [Hz], mass [kg], device_damping b [N s/m], push of the hand [N], initial speed and distance
+    from the wall, delay of readings and of forces [samples each], resolution of the sensor [m],
+    restitution
     """
 
     rate: float = 512.0
@@ -58,7 +69,8 @@ class Loop:
         return 1.0 / self.rate
 
     def passive_damping(self, stiffness: Floats) -> Floats:
-        """Largest virtual damping B that Colgate and Schenkel's condition b >= KT/2 + |B| allows; if negative, none."""
+        """Largest virtual damping B that Colgate and Schenkel's condition b >= KT/2 + |B| allows;
+        if negative, none."""
         return self.device_damping - 0.5 * stiffness * self.step
 
 
@@ -66,9 +78,12 @@ class Loop:
 class Contact:
     """Outcome at each wall; every array has the shape of the walls.
 
-    settled : whether in the last quarter of the time the mass is still and never leaves the wall, and has not grown
-    settling_time : time from the first contact to the last motion [s], infinite if the mass still moves at the end
-    grown : whether the mass exceeds GROWN times its initial speed later than 1 s after the first contact at any wall
+    settled : whether in the last quarter of the time the mass is still and never leaves the wall,
+        and has not grown
+    settling_time : time from the first contact to the last motion [s], infinite if the mass still
+        moves at the end
+    grown : whether the mass exceeds GROWN times its initial speed later than 1 s after the first
+        contact at any wall
     bounces : number of times that the mass leaves the wall
     penetration : largest penetration [m]; peak_force : largest force [N]
     rate_hardness : first rate of the force over the first speed [N/m] (Lawrence et al. 2000)
@@ -105,7 +120,10 @@ def touch_walls(loop: Loop, stiffness: Floats, damping: Floats, law: str) -> Con
     steps = round(loop.seconds * loop.rate)
     x, v = np.full(K.shape, -loop.distance), np.full(K.shape, loop.speed)
     first = np.round(x / r) * r if r > 0.0 else x.copy()
-    readings = [first - loop.speed * loop.step, *[first] * (loop.delay + 1)]  # those that are delayed, oldest first
+    readings = [
+        first - loop.speed * loop.step,
+        *[first] * (loop.delay + 1),
+    ]  # those that are delayed, oldest first
     commands = [np.zeros(K.shape) for _ in range(loop.delay)]
     positions, speeds, forces = (np.empty((steps, *K.shape)) for _ in range(3))
     free, moved, held = _held_force(loop)
@@ -128,10 +146,15 @@ def touch_walls(loop: Loop, stiffness: Floats, damping: Floats, law: str) -> Con
 
 
 def _held_force(loop: Loop) -> tuple[float, float, float]:
-    """Return E, φ, ψ of the exact step v⁺ = E v + φ a, x⁺ = x + φ v + ψ a with c = bT/m, E = exp(−c)."""
+    """Return E, φ, ψ of the exact step v⁺ = E v + φ a, x⁺ = x + φ v + ψ a with c = bT/m, E =
+    exp(−c)."""
     T, c = loop.step, loop.device_damping * loop.step / loop.mass
     if c < _SMALL:
-        return 1.0 - c + 0.5 * c * c, T * (1.0 - c / 2.0 + c * c / 6.0), T * T * (0.5 - c / 6.0 + c * c / 24.0)
+        return (
+            1.0 - c + 0.5 * c * c,
+            T * (1.0 - c / 2.0 + c * c / 6.0),
+            T * T * (0.5 - c / 6.0 + c * c / 24.0),
+        )
     phi = -np.expm1(-c) / c * T
     return float(np.exp(-c)), float(phi), float((T - phi) * T / c)
 
@@ -144,32 +167,51 @@ def _watched(loop: Loop, positions: Floats, speeds: Floats, forces: Floats) -> C
     moving = np.abs(speeds) > SETTLED_SPEED
     last_moving = np.where(moving.any(axis=0), steps - 1 - moving[::-1].argmax(axis=0), 0)
     left = inside[:-1] & ~inside[1:]
-    bouncing = left[round((1.0 - _LAST) * steps) :].any(axis=0)  # for ever, if slower than SETTLED_SPEED
+    bouncing = left[round((1.0 - _LAST) * steps) :].any(
+        axis=0
+    )  # for ever, if slower than SETTLED_SPEED
     settled = (last_moving < (1.0 - _LAST) * steps) & ~bouncing
     grown = (np.abs(speeds[time > time[first].min() + 1.0]) > GROWN * loop.speed).any(axis=0)
     first_force = np.take_along_axis(forces, (forces > 0.0).argmax(axis=0)[None], axis=0)[0]
-    return Contact(settled & ~grown, np.where(settled, np.maximum(time[last_moving] - time[first], 0.0), np.inf), grown,
-                   left.sum(axis=0), positions.max(axis=0, initial=0.0), first_force / loop.step / loop.speed,
-                   forces.max(axis=0))  # fmt: skip
+    return Contact(
+        settled & ~grown,
+        np.where(settled, np.maximum(time[last_moving] - time[first], 0.0), np.inf),
+        grown,
+        left.sum(axis=0),
+        positions.max(axis=0, initial=0.0),
+        first_force / loop.step / loop.speed,
+        forces.max(axis=0),
+    )
 
 
 def loops() -> tuple[Loop, ...]:
-    """Return the loops: 512 Hz and 1 kHz, ideal and delayed sensors, with and without physical damping.
+    """Return the loops: 512 Hz and 1 kHz, ideal and delayed sensors, with and without physical
+    damping.
 
     The paper's device has no physical damping.
     """
-    kinds = [(rate, sensors, b) for rate in (512.0, 1000.0) for sensors in ((0, 0.0), LATE) for b in (0.0, 5.0)]
-    return tuple(Loop(rate=rate, device_damping=b, delay=delay, resolution=r) for rate, (delay, r), b in kinds)
+    kinds = [
+        (rate, sensors, b)
+        for rate in (512.0, 1000.0)
+        for sensors in ((0, 0.0), LATE)
+        for b in (0.0, 5.0)
+    ]
+    return tuple(
+        Loop(rate=rate, device_damping=b, delay=delay, resolution=r)
+        for rate, (delay, r), b in kinds
+    )
 
 
 def grid(depth: str) -> tuple[Floats, Floats]:
-    """Return stiffnesses of 0.1 to 1000 kN/m, and dampings of 0 and 1 to 3000 N s/m, including the paper's 50."""
+    """Return stiffnesses of 0.1 to 1000 kN/m, and dampings of 0 and 1 to 3000 N s/m, including the
+    paper's 50."""
     stiffnesses, dampings = GRIDS[depth]
     damping = np.concatenate([[0.0], np.geomspace(1.0, 3e3, dampings - 2), [PAPER_DAMPING]])
     return np.geomspace(1e2, 1e6, stiffnesses), np.sort(damping)
 
 
 def maps_of(loop: Loop, stiffness: Floats, damping: Floats) -> tuple[Contact, Contact]:
-    """Return the outcomes (m, k) with penalties and with impulses at m dampings and k stiffnesses."""
+    """Return the outcomes (m, k) with penalties and with impulses at m dampings and k
+    stiffnesses."""
     penalty, impulses = (touch_walls(loop, stiffness, damping[:, None], law) for law in LAWS)
     return penalty, impulses

@@ -1,1 +1,2 @@
-"""Compiled contact kernels: they read arrays, write `out`, return a status and allocate nothing in a step."""
+"""Compiled contact kernels: they read arrays, write `out`, return a status and allocate nothing in
+a step."""

@@ -1,10 +1,13 @@
-"""Broad phase: find the pairs of shapes whose bounding spheres overlap, at a cost linear in the moving shapes.
+"""Broad phase: find the pairs of shapes whose bounding spheres overlap, at a cost linear in the
+moving shapes.
 
-Moving shapes are sorted into the cells of a uniform grid. A cell is as wide as the largest moving shape, so two shapes
-can touch only in the same cell or in neighbouring cells. A hash table of chains finds the cells. Every moving shape is
-compared with every static one, which is linear in the moving shapes too.
+Moving shapes are sorted into the cells of a uniform grid. A cell is as wide as the largest moving
+shape, so two shapes can touch only in the same cell or in neighbouring cells. A hash table of
+chains finds the cells. Every moving shape is compared with every static one, which is linear in the
+moving shapes too.
 
-The pairs keep the order of the candidate pairs, so a scene gives the same bits with and without the broad phase.
+The pairs keep the order of the candidate pairs, so a scene gives the same bits with and without the
+broad phase.
 """
 
 from __future__ import annotations
@@ -19,9 +22,11 @@ from iapb.contact.geometry import ENDLESS, HALF_SPACE, POLYGON, Shapes
 from iapb.linalg import add, dot, load, store, subtract, transform
 from iapb.schema import Floats, Indices, Integers, States, blank, quantities
 
-# Below this number of candidate pairs testing all is as fast: the narrow phase rejects distant pairs early.
+# Below this number of candidate pairs testing all is as fast: the narrow phase rejects distant
+# pairs early.
 WORTHWHILE_PAIRS = 150
-# Pairs kept per shape: bounding spheres of equal, closely packed shapes overlap about a dozen neighbours.
+# Pairs kept per shape: bounding spheres of equal, closely packed shapes overlap about a dozen
+# neighbours.
 PAIRS_PER_SHAPE = 40
 
 
@@ -31,7 +36,9 @@ class BroadPhase(NamedTuple):
     moving: Indices  # (k,) shapes on moving bodies
     static: Indices  # (n - k,)
     body: Indices  # (n,)
-    allowed: Annotated[States, "shape shape"]  # for i < j: 1 candidate pair (i, j), 2 candidate pair (j, i), 0 none
+    allowed: Annotated[
+        States, "shape shape"
+    ]  # for i < j: 1 candidate pair (i, j), 2 candidate pair (j, i), 0 none
     local_center: Annotated[Floats, "shape 3"]  # [m] of the bounding sphere in the body's frame
     radius: Annotated[Floats, "shape"]  # [m], infinite for half-planes and half-spaces
     cell_size: float  # [m] largest diameter of a moving shape
@@ -46,12 +53,20 @@ class BroadPhase(NamedTuple):
 
 
 def make_broad_phase(shapes: Shapes, pairs: Indices) -> BroadPhase:
-    """Return the broad phase of the candidate pairs (k, 2); a stub if testing all of them is as fast."""
+    """Return the broad phase of the candidate pairs (k, 2); a stub if testing all of them is as
+    fast."""
     pairs = pairs if len(pairs) > WORTHWHILE_PAIRS else pairs[:0]
     n = len(shapes.kind) if len(pairs) else 0
-    moving, static = (np.flatnonzero(each).astype(np.int32) for each in (shapes.body[:n] >= 0, shapes.body[:n] < 0))
-    lengths = {"shape": n, "moving": len(moving), "bucket": 1 << (2 * len(moving)).bit_length(),
-               "pair": max(1, min(len(pairs), PAIRS_PER_SHAPE * n))}
+    moving, static = (
+        np.flatnonzero(each).astype(np.int32)
+        for each in (shapes.body[:n] >= 0, shapes.body[:n] < 0)
+    )
+    lengths = {
+        "shape": n,
+        "moving": len(moving),
+        "bucket": 1 << (2 * len(moving)).bit_length(),
+        "pair": max(1, min(len(pairs), PAIRS_PER_SHAPE * n)),
+    }
     arrays = blank(quantities(BroadPhase), lengths)
     for a, b in pairs:
         arrays["allowed"][min(a, b), max(a, b)] = 1 if a < b else 2
@@ -59,16 +74,24 @@ def make_broad_phase(shapes: Shapes, pairs: Indices) -> BroadPhase:
         arrays["local_center"][i], arrays["radius"][i] = _bounding_sphere(shapes, i)
     arrays["center"][:] = arrays["local_center"]
     return BroadPhase(
-        moving, static, shapes.body[:n].copy(), **arrays, used=flag(len(pairs) > 0),
+        moving,
+        static,
+        shapes.body[:n].copy(),
+        **arrays,
+        used=flag(len(pairs) > 0),
         cell_size=float(2.0 * arrays["radius"][moving].max(initial=0.0)) or 1.0,
-        neighbours=27 if np.any(shapes.kind >= HALF_SPACE) else 9)
+        neighbours=27 if np.any(shapes.kind >= HALF_SPACE) else 9,
+    )
 
 
 def _bounding_sphere(shapes: Shapes, i: int) -> tuple[Any, float]:
-    """Return the centre in the body's frame and the radius [m]: of the box around a polygon, exact for others."""
+    """Return the centre in the body's frame and the radius [m]: of the box around a polygon, exact
+    for others."""
     if shapes.kind[i] != POLYGON:
         endless = shapes.kind[i] in ENDLESS
-        return shapes.center[i], math.inf if endless else float(shapes.radius[i]) + math.hypot(*shapes.half_size[i])
+        return shapes.center[i], math.inf if endless else float(shapes.radius[i]) + math.hypot(
+            *shapes.half_size[i]
+        )
     corners = shapes.vertices[shapes.first[i] : shapes.first[i] + shapes.count[i]]
     middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
     return [*middle, 0.0], max(math.hypot(*corner) for corner in corners - middle)
@@ -79,7 +102,8 @@ LARGEST_CELL = 2**40  # cell number of distant coordinates; int64 holds this cel
 
 @kernel(needs="used", otherwise=0)
 def near_pairs(broad, R, p, margin):
-    """Write the pairs that may have gap <= margin to `broad.pairs`; return how many, -1 if they do not fit."""
+    """Write the pairs that may have gap <= margin to `broad.pairs`; return how many, -1 if they do
+    not fit."""
     width, count = broad.cell_size + margin, 0
     broad.first[:] = -1
     for m in range(broad.moving.shape[0]):
@@ -112,18 +136,23 @@ def near_pairs(broad, R, p, margin):
 
 @kernel
 def bucket_of(broad, x, y, z):
-    """Return the bucket of a cell, of 2ⁿ buckets, by a hash with three primes (Teschner et al., 2003)."""
+    """Return the bucket of a cell, of 2ⁿ buckets, by a hash with three primes (Teschner et al.,
+    2003)."""
     return ((x * 73856093) ^ (y * 19349663) ^ (z * 83492791)) & (broad.first.shape[0] - 1)
 
 
 @kernel
 def keep_pair(broad, i, j, margin, count):
-    """Append the pair if it is a candidate and its bounding spheres overlap; return the new count, -1: no room."""
+    """Append the pair if it is a candidate and its bounding spheres overlap; return the new count,
+    -1: no room."""
     if i > j:
         i, j = j, i
     if broad.allowed[i, j] == 0:
         return count
-    reach, apart = broad.radius[i] + broad.radius[j] + margin, subtract(load(broad.center, i), load(broad.center, j))
+    reach, apart = (
+        broad.radius[i] + broad.radius[j] + margin,
+        subtract(load(broad.center, i), load(broad.center, j)),
+    )
     if dot(apart, apart) > reach * reach:
         return count
     if not 0 <= count < broad.key.shape[0]:
@@ -134,7 +163,8 @@ def keep_pair(broad, i, j, margin, count):
 
 @kernel
 def sort_keys(keys, count):
-    """Sort the first `count` keys by Shell's method: no recursion, no scratch, few steps for every input order."""
+    """Sort the first `count` keys by Shell's method: no recursion, no scratch, few steps for every
+    input order."""
     gap = count
     while gap > 1:
         gap = max(1, 4 * gap // 9)

@@ -20,18 +20,26 @@ from iapb.contact.kernels.impact_friction import add_impact_friction, sweep_impa
 from iapb.contact.kernels.joint_stops import is_stop
 from iapb.contact.kernels.passive import passive_step, write_step
 from iapb.contact.kernels.row_basis import minimum_norm_impulses, orthonormal_basis
-from iapb.contact.kernels.rows import body_row, contact_velocities, direction_row, friction_of, tangent_of
+from iapb.contact.kernels.rows import (
+    body_row,
+    contact_velocities,
+    direction_row,
+    friction_of,
+    tangent_of,
+)
 from iapb.contact.kernels.shape_frames import copy_contact
 from iapb.contact.kernels.unilateral import poisson_impact
 from iapb.linalg import dot_of, load
 from iapb.run import COLLIDING
 
-OPENS = 1e-9  # share of |u|, and of the largest impulse, above which a contact opens or pulls: far above rounding
+# share of |u|, and of the largest impulse, above which a contact opens or pulls: far above rounding
+OPENS = 1e-9
 
 
 @kernel
 def gather_group(world, state, island):
-    """List the coordinates of an island, a contact group (2)-(3) or a part of one; copy v, M and L; return its size.
+    """List the coordinates of an island, a contact group (2)-(3) or a part of one; copy v, M and L;
+    return its size.
 
     M is block diagonal, so its factor is too.
     """
@@ -51,10 +59,14 @@ def gather_group(world, state, island):
 
 @kernel
 def gather_rows(world, state, island, size):
-    """Write the rows of J_c, return how many: (11) against the world; (12), or both of (13)-(14), for two bodies."""
+    """Write the rows of J_c, return how many: (11) against the world; (12), or both of (13)-(14),
+    for two bodies."""
     contacts, count = state.contacts, 0
     for i in range(state.contact_count[0]):
-        if not contacts.collides[i] or state.island_of_tree[world.tree_of_body[contacts.body_a[i]]] != island:
+        if (
+            not contacts.collides[i]
+            or state.island_of_tree[world.tree_of_body[contacts.body_a[i]]] != island
+        ):
             continue
         both = world.per_body_rows and contacts.body_b[i] >= 0 and not is_stop(contacts, i)
         for side in range(2 if both else 1):
@@ -62,7 +74,9 @@ def gather_rows(world, state, island, size):
                 body = contacts.body_a[i] if side == 0 else contacts.body_b[i]
                 body_row(world.mechanism, state.body, body, contacts, i, state.row)
             else:
-                direction_row(world.mechanism, state.body, contacts, i, load(contacts.normal, i), state.row)
+                direction_row(
+                    world.mechanism, state.body, contacts, i, load(contacts.normal, i), state.row
+                )
             for k in range(size):
                 state.work.columns[k, count] = state.row[state.dofs[k]]
             state.rows[count] = i
@@ -72,9 +86,11 @@ def gather_rows(world, state, island, size):
 
 @kernel
 def largest_share(impulse, dofs, size, dt, force_limit):
-    """Return the largest share in [0, 1] with |share · p_i / Δt| <= the limit of each dof, in floating point too.
+    """Return the largest share in [0, 1] with |share · p_i / Δt| <= the limit of each dof, in
+    floating point too.
 
-    impulse (size,) [N s, N m s] of a group; dofs (size,) its coordinates; force_limit (d,) [N, N m], inf = none
+    impulse (size,) [N s, N m s] of a group; dofs (size,) its coordinates; force_limit (d,) [N, N
+    m], inf = none
     """
     share = 1.0
     for i in range(size):
@@ -82,17 +98,20 @@ def largest_share(impulse, dofs, size, dt, force_limit):
         if share * force > limit:
             share = limit / force
     for i in range(size):
-        while share * abs(impulse[i]) / dt > force_limit[dofs[i]]:  # the division rounded up: one step back
+        while (
+            share * abs(impulse[i]) / dt > force_limit[dofs[i]]
+        ):  # the division rounded up: one step back
             share = np.nextafter(share, 0.0)
     return share
 
 
 @kernel
 def apply_group(state, size, share):
-    """Write the group's new velocity and impulse back; return the kinetic energy it lost [J] and the share applied.
+    """Write the group's new velocity and impulse back; return the kinetic energy it lost [J] and
+    the share applied.
 
-    The applied share is `share` unless rounding of the velocity would gain energy (`iapb.contact.kernels.passive`).
-    With Δv = v⁺ − v⁻ and M Δv = Jᵀp the loss is −(v⁻ + Δv/2)·Jᵀp.
+    The applied share is `share` unless rounding of the velocity would gain energy
+    (`iapb.contact.kernels.passive`). With Δv = v⁺ − v⁻ and M Δv = Jᵀp the loss is −(v⁻ + Δv/2)·Jᵀp.
     """
     work = state.work
     v, change, after = work.v[:size], work.v_change[:size], work.shifted[:size]
@@ -116,9 +135,12 @@ def apply_group(state, size, share):
 
 @kernel(needs="unequal_restitution pushing supports", otherwise=(0, 1.0, False))
 def resolve_unequal(world, state, size, count, smallest, tolerance):
-    """Apply Poisson's law to rows of unequal e; if it fails, the scalar rule with the smallest e, which is passive."""
+    """Apply Poisson's law to rows of unequal e; if it fails, the scalar rule with the smallest e,
+    which is passive."""
     work = state.work
-    rank, clamp = poisson_impact(size, count, state.row_restitution, True, work, state.push_work, state.row_impulse)
+    rank, clamp = poisson_impact(
+        size, count, state.row_restitution, True, work, state.push_work, state.row_impulse
+    )
     solved = rank >= 0
     if not solved:
         rank, clamp = factored_impact(size, count, smallest, tolerance, size, True, work)
@@ -127,10 +149,19 @@ def resolve_unequal(world, state, size, count, smallest, tolerance):
 
 @kernel(needs="impact_friction", otherwise=(1.0, 1.0, True))
 def add_friction_to_impact(world, state, size, count, rank, only_push):
-    """Add friction to the normal impact; return (share kept, clamp, whether Coulomb's law is met)."""
+    """Add friction to the normal impact; return (share kept, clamp, whether Coulomb's law is
+    met)."""
     gather_tangents(world, state, size, count)
-    return add_impact_friction(size, count, rank, state.work, state.push_work, state.friction_work, only_push,
-                               state.row_impulse)
+    return add_impact_friction(
+        size,
+        count,
+        rank,
+        state.work,
+        state.push_work,
+        state.friction_work,
+        only_push,
+        state.row_impulse,
+    )
 
 
 @kernel(needs="impact_friction", otherwise=None)
@@ -150,9 +181,11 @@ def gather_tangents(world, state, size, count):
 
 @kernel
 def keep_together(state, size, count):
-    """Put the rows first that push, or that meet −e γ⁻ after Poisson's law; return how many. The others open.
+    """Put the rows first that push, or that meet −e γ⁻ after Poisson's law; return how many. The
+    others open.
 
-    Writes the least velocity of each along unit rows: −e γ⁻ or zero where it opens, else that after Poisson's law.
+    Writes the least velocity of each along unit rows: −e γ⁻ or zero where it opens, else that after
+    Poisson's law.
     """
     work, least, kept = state.work, state.friction_work.least, 0
     opens = OPENS * math.sqrt(dot_of(work.u[:size], work.u[:size]))
@@ -178,10 +211,12 @@ def keep_together(state, size, count):
 
 @kernel(needs="impact_friction", otherwise=(0, 1.0, 1.0, True))
 def push_with_friction(world, state, size, count, smallest, tolerance):
-    """Resolve contacts that only push, with friction; return (rank, clamp, share of friction, solved).
+    """Resolve contacts that only push, with friction; return (rank, clamp, share of friction,
+    solved).
 
-    Friction acts where contacts stay together. Where it would make one of them pull, sweeps over all contacts decide
-    which open: a tall box that lands flat and slides tips over its leading edge, a disc climbs the wall it rolls into.
+    Friction acts where contacts stay together. Where it would make one of them pull, sweeps over
+    all contacts decide which open: a tall box that lands flat and slides tips over its leading
+    edge, a disc climbs the wall it rolls into.
     """
     work, f, together = state.work, state.friction_work, count
     rank, clamp, solved = resolve_unequal(world, state, size, count, smallest, tolerance)
@@ -201,8 +236,16 @@ def push_with_friction(world, state, size, count, smallest, tolerance):
 
 @kernel
 def resolve_rows(world, state, size, count):
-    """Resolve by (20)-(21) or by the scene's extensions of them; return (rank, clamp, share of friction, solved)."""
-    work, contacts, e, unequal, solved, friction_share = state.work, state.contacts, world.restitution, False, True, 1.0
+    """Resolve by (20)-(21) or by the scene's extensions of them; return (rank, clamp, share of
+    friction, solved)."""
+    work, contacts, e, unequal, solved, friction_share = (
+        state.work,
+        state.contacts,
+        world.restitution,
+        False,
+        True,
+        1.0,
+    )
     tolerance = rank_tolerance(work.lower[:size, :size])
     if world.switches.unequal_restitution or world.switches.pushing or world.implicit:
         e, largest, unequal = 1.0, 0.0, world.switches.pushing or world.implicit and count > 1
@@ -225,7 +268,9 @@ def resolve_rows(world, state, size, count):
         friction_share, factor, met = add_friction_to_impact(world, state, size, count, span, False)
         clamp, solved = clamp * factor, solved and met
     elif not (unequal and solved):
-        minimum_norm_impulses(size, count, rank, work.length, work.change[:size], state.row_impulse, work)
+        minimum_norm_impulses(
+            size, count, rank, work.length, work.change[:size], state.row_impulse, work
+        )
     return rank, clamp, friction_share, solved
 
 
@@ -246,7 +291,9 @@ def resolve_island(world, state, island):
     if applied < share:
         clamp *= applied / share
     for r in range(count):
-        if r == 0 or state.rows[r] != state.rows[r - 1]:  # of two per-body rows the first is the one on body a
+        if (
+            r == 0 or state.rows[r] != state.rows[r - 1]
+        ):  # of two per-body rows the first is the one on body a
             i, impulse = state.rows[r], applied * state.row_impulse[r]
             before = state.contact_impulse[i]
             state.contact_impulse[i] = impulse if before == 0.0 else before + impulse
@@ -257,7 +304,10 @@ def resolve_island(world, state, island):
     log.group[line], log.rows[line], log.rank[line] = island, count, rank
     log.scale[line], log.clamp[line], log.energy_lost[line] = share, clamp, lost
     log.friction_share[line], log.solved[line], log.approaching[line] = (
-        friction_share, solved and clamp > 0.0, approaching)
+        friction_share,
+        solved and clamp > 0.0,
+        approaching,
+    )
     copy_into(log.v_minus[line], state.v)
     copy_into(log.v_plus[line], state.v)
     log.impulse[line] = 0.0
@@ -269,10 +319,11 @@ def resolve_island(world, state, island):
 
 @kernel
 def resolve_collisions(world, state):
-    """Give every colliding group its impulse, island by island; velocities change, configurations do not.
+    """Give every colliding group its impulse, island by island; velocities change, configurations
+    do not.
 
-    With implicit contact, contacts that carry a load only push (Poisson's law). What approaches because of an impact
-    collides in its turn, as the balls of a cradle that touch.
+    With implicit contact, contacts that carry a load only push (Poisson's law). What approaches
+    because of an impact collides in its turn, as the balls of a cradle that touch.
     """
     add_supports(world, state)
     collide = find_islands(world, state)
@@ -285,11 +336,18 @@ def resolve_collisions(world, state):
 
 @kernel(needs="implicit", otherwise=False)
 def strike_again(world, state):
-    """Find the contacts of colliding groups that impacts have made approach; return False if there are none.
+    """Find the contacts of colliding groups that impacts have made approach; return False if there
+    are none.
 
-    The impacts of a step are at most as many as its log has lines. What is left strikes in the next step.
+    The impacts of a step are at most as many as its log has lines. What is left strikes in the next
+    step.
     """
-    contacts, now, count, some = state.contacts, state.scratch_contacts, state.contact_count[0], False
+    contacts, now, count, some = (
+        state.contacts,
+        state.scratch_contacts,
+        state.contact_count[0],
+        False,
+    )
     if not world.implicit or world.switches.impulse_limit:
         return False
     for i in range(count):
@@ -298,8 +356,11 @@ def strike_again(world, state):
     for i in range(count):
         group = group_of_contact(world, contacts, i, state.group_of_tree)
         e = pair_restitution(world, contacts, i)
-        if (state.state_of_tree[group] == COLLIDING and e > 0.0
-                and now.normal_velocity[i] < -world.approach_velocity):
+        if (
+            state.state_of_tree[group] == COLLIDING
+            and e > 0.0
+            and now.normal_velocity[i] < -world.approach_velocity
+        ):
             contacts.mark[i], contacts.collides[i], some = STRIKES, True, True
         elif contacts.mark[i] == STRIKES:
             contacts.mark[i], contacts.collides[i] = 0, False

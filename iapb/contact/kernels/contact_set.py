@@ -1,4 +1,5 @@
-"""The contact set of a step (paper section III): clusters, new contacts, groups, states, colliding rows."""
+"""The contact set of a step (paper section III): clusters, new contacts, groups, states, colliding
+rows."""
 
 from __future__ import annotations
 
@@ -8,17 +9,19 @@ from iapb.contact.kernels.shape_frames import copy_contact
 from iapb.linalg import dot, load, subtract
 from iapb.run import COLLIDING, FREE, RESTING
 
-# Two normals are aligned, and may belong to one surface, when the cosine of their angle is at least this: 31.8
-# degrees. The facets of a 12-sided socket (30 degrees apart) then count as one round surface; a floor and a
-# wall, or two sides of a triangle, do not.
+# Two normals are aligned, and may belong to one surface, when the cosine of their angle is at least
+# this: 31.8 degrees. The facets of a 12-sided socket (30 degrees apart) then count as one round
+# surface; a floor and a wall, or two sides of a triangle, do not.
 ALIGNED_COSINE = 0.85
 
-# An overlap up to this [m] counts as touching: rounding of positions causes it, and its penalty force is negligible.
+# An overlap up to this [m] counts as touching: rounding of positions causes it, and its penalty
+# force is negligible.
 TOUCHING = 1e-12
 
 _UNDECIDED, _KEPT, _DROPPED = 0, 1, 2  # marks while contacts are clustered
 
-# Marks in an impact under implicit contact: it strikes, it carries a load, it would strike but the log is full.
+# Marks in an impact under implicit contact: it strikes, it carries a load, it would strike but the
+# log is full.
 STRIKES, HOLDS, LEFT = 1, 2, 3
 
 
@@ -31,19 +34,28 @@ def squared_distance(first, i, second, j):
 
 @kernel
 def same_surface(first, i, second, j):
-    """Return whether both contacts have the same two bodies, which come in one order always, and aligned normals."""
-    return (first.body_a[i] == second.body_a[j] and first.body_b[i] == second.body_b[j]
-            and dot(load(first.normal, i), load(second.normal, j)) >= ALIGNED_COSINE)
+    """Return whether both contacts have the same two bodies, which come in one order always, and
+    aligned normals."""
+    return (
+        first.body_a[i] == second.body_a[j]
+        and first.body_b[i] == second.body_b[j]
+        and dot(load(first.normal, i), load(second.normal, j)) >= ALIGNED_COSINE
+    )
 
 
 @kernel(needs="clustering", otherwise=0)
 def cluster(world, contacts, count):
-    """Collapse contacts of one surface closer than `cluster_distance` into the deepest; return how many stay.
+    """Collapse contacts of one surface closer than `cluster_distance` into the deepest; return how
+    many stay.
 
-    Contacts are visited deepest first. A contact is kept unless a deeper kept contact of its surface is closer. So kept
-    contacts of a surface are at least that distance apart; they keep their order.
+    Contacts are visited deepest first. A contact is kept unless a deeper kept contact of its
+    surface is closer. So kept contacts of a surface are at least that distance apart; they keep
+    their order.
     """
-    distance, near = world.cluster_distance, False  # usually none are, and to see this is cheaper than the clustering
+    distance, near = (
+        world.cluster_distance,
+        False,
+    )  # usually none are, and to see this is cheaper than the clustering
     for i in range(count):
         for j in range(i):
             near = near or squared_distance(contacts, i, contacts, j) < distance * distance
@@ -53,14 +65,19 @@ def cluster(world, contacts, count):
     while True:
         deepest = -1
         for i in range(count):
-            if contacts.mark[i] == _UNDECIDED and (deepest < 0 or contacts.gap[i] < contacts.gap[deepest]):
+            if contacts.mark[i] == _UNDECIDED and (
+                deepest < 0 or contacts.gap[i] < contacts.gap[deepest]
+            ):
                 deepest = i
         if deepest < 0:
             break
         contacts.mark[deepest] = _KEPT
         for i in range(count):
-            if (contacts.mark[i] == _UNDECIDED and same_surface(contacts, deepest, contacts, i)
-                    and squared_distance(contacts, deepest, contacts, i) < distance * distance):
+            if (
+                contacts.mark[i] == _UNDECIDED
+                and same_surface(contacts, deepest, contacts, i)
+                and squared_distance(contacts, deepest, contacts, i) < distance * distance
+            ):
                 contacts.mark[i] = _DROPPED
     kept = 0
     for i in range(count):
@@ -73,26 +90,34 @@ def cluster(world, contacts, count):
 
 @kernel
 def mark_new(contacts, count, previous, previous_count, distance):
-    """Write is_new from temporal coherence: by position, or by shapes and feature alone if `distance` is 0.
+    """Write is_new from temporal coherence: by position, or by shapes and feature alone if
+    `distance` is 0.
 
-    A contact is old if the step before had a contact (overlap beyond TOUCHING) with the same shapes and feature, or
-    one within `distance` [m] on the same surface. The distance must exceed (largest speed) × (step). One previous
-    contact may match several: a facet's edge that appears beside the facet is the same contact (paper III).
-    A corner that slides along the floor into a wall is new, since the normals differ at the same point.
-    A contact that only touched in the step before is new, since no force has acted at it yet (balls of a cradle).
+    A contact is old if the step before had a contact (overlap beyond TOUCHING) with the same shapes
+    and feature, or one within `distance` [m] on the same surface. The distance must exceed (largest
+    speed) × (step). One previous contact may match several: a facet's edge that appears beside the
+    facet is the same contact (paper III). A corner that slides along the floor into a wall is new,
+    since the normals differ at the same point. A contact that only touched in the step before is
+    new, since no force has acted at it yet (balls of a cradle).
 
-    Contacts keep their order from step to step, so the search begins after the last match. The cost is linear in
-    the contacts that last.
+    Contacts keep their order from step to step, so the search begins after the last match. The cost
+    is linear in the contacts that last.
     """
     begin = 0
     for i in range(count):
         contacts.is_new[i] = True
         for k in range(previous_count):
             j = begin + k if begin + k < previous_count else begin + k - previous_count
-            if previous.gap[j] < -TOUCHING and (_same_name(contacts, i, previous, j) or (
-                    distance > 0.0 and not is_stop(contacts, i) and not is_stop(previous, j)
+            if previous.gap[j] < -TOUCHING and (
+                _same_name(contacts, i, previous, j)
+                or (
+                    distance > 0.0
+                    and not is_stop(contacts, i)
+                    and not is_stop(previous, j)
                     and same_surface(contacts, i, previous, j)
-                    and squared_distance(contacts, i, previous, j) <= distance * distance)):
+                    and squared_distance(contacts, i, previous, j) <= distance * distance
+                )
+            ):
                 contacts.is_new[i] = False
                 begin = j + 1 if j + 1 < previous_count else 0
                 break
@@ -101,13 +126,17 @@ def mark_new(contacts, count, previous, previous_count, distance):
 @kernel
 def _same_name(first, i, second, j):
     """Return whether shapes and feature of two contacts are the same."""
-    return (first.shape_a[i] == second.shape_a[j] and first.shape_b[i] == second.shape_b[j]
-            and first.feature[i] == second.feature[j])
+    return (
+        first.shape_a[i] == second.shape_a[j]
+        and first.shape_b[i] == second.shape_b[j]
+        and first.feature[i] == second.feature[j]
+    )
 
 
 @kernel
 def contact_before(state, i, begin):
-    """Return the previous contact with shapes and feature of contact i, −1 = none; the search begins at `begin`."""
+    """Return the previous contact with shapes and feature of contact i, −1 = none; the search
+    begins at `begin`."""
     total = state.contact_count[1]
     for k in range(total):
         j = begin + k if begin + k < total else begin + k - total
@@ -139,12 +168,18 @@ def group_of_contact(world, contacts, i, group_of_tree):
 def classify(world, state, count):
     """Write the groups, the state of each (free, colliding, resting) and the contacts that collide.
 
-    Contacts between two bodies that can move link groups. A contact approaches if v_n < −approach_velocity [m/s]. With
-    impulses a group collides if one of its *new* contacts approaches, or if any contact approaches while an impulse is
-    still being spread. Then every approaching contact of the group, new or old, enters the impact. `spreading`, trees
-    with an unfinished impulse, is cleared if the group no longer collides.
+    Contacts between two bodies that can move link groups. A contact approaches if v_n <
+    −approach_velocity [m/s]. With impulses a group collides if one of its *new* contacts
+    approaches, or if any contact approaches while an impulse is still being spread. Then every
+    approaching contact of the group, new or old, enters the impact. `spreading`, trees with an
+    unfinished impulse, is cleared if the group no longer collides.
     """
-    contacts, groups, states, spreading = state.contacts, state.group_of_tree, state.state_of_tree, state.spreading
+    contacts, groups, states, spreading = (
+        state.contacts,
+        state.group_of_tree,
+        state.state_of_tree,
+        state.spreading,
+    )
     trees, approaching = groups.shape[0], False
     for t in range(trees):
         groups[t], states[t] = t, FREE
@@ -174,15 +209,17 @@ def classify(world, state, count):
 
 # Islands of a colliding group: trees that contacts *of this collision* link.
 #
-# M is block diagonal in the trees, and a row has entries only for the trees of its contact, so (21) separates into the
-# islands. Touching trees outside the islands are neither copied nor factored.
+# M is block diagonal in the trees, and a row has entries only for the trees of its contact, so (21)
+# separates into the islands. Touching trees outside the islands are neither copied nor factored.
 
 
 @kernel
 def find_islands(world, state):
-    """Write island_of_tree, the first tree of each tree's island, and collides_of_tree; return False if none collides.
+    """Write island_of_tree, the first tree of each tree's island, and collides_of_tree; return
+    False if none collides.
 
-    With an impulse limit islands are the groups, since the paper scales all impulses of a group by one factor.
+    With an impulse limit islands are the groups, since the paper scales all impulses of a group by
+    one factor.
     """
     any_collides = False
     for t in range(world.tree_start.shape[0]):
@@ -205,7 +242,8 @@ def find_islands(world, state):
 
 @kernel
 def pair_restitution(world, contacts, i):
-    """Return e of contact i: the smaller value of its two shapes; the scene's if neither has one (both are above 1)."""
+    """Return e of contact i: the smaller value of its two shapes; the scene's if neither has one
+    (both are above 1)."""
     e = min(world.own_restitution[contacts.shape_a[i]], world.own_restitution[contacts.shape_b[i]])
     return world.restitution if e > 1.0 else e
 
@@ -214,8 +252,9 @@ def pair_restitution(world, contacts, i):
 def add_supports(world, state):
     """Mark what strikes; of a colliding group, contacts that carry a load enter the impact, too.
 
-    Without them the body struck would move into its support, and resting contact would stop it: a ball would hardly
-    bounce on a book that lies on the floor. Where nothing bounces, resting contact stops all, with friction.
+    Without them the body struck would move into its support, and resting contact would stop it: a
+    ball would hardly bounce on a book that lies on the floor. Where nothing bounces, resting
+    contact stops all, with friction.
     """
     contacts, begin, bounces = state.contacts, 0, False
     for i in range(state.contact_count[0] if world.implicit else 0):

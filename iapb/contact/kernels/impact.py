@@ -1,4 +1,5 @@
-"""One impact on plain arrays: whiten, project, return to v, clamp. Allocation-free given an `ImpactWork`."""
+"""One impact on plain arrays: whiten, project, return to v, clamp. Allocation-free given an
+`ImpactWork`."""
 
 from __future__ import annotations
 
@@ -9,14 +10,24 @@ from iapb.compiled import kernel
 from iapb.contact.kernels.passive import UNIT, passive_step, write_step
 from iapb.contact.kernels.row_basis import orthonormal_basis
 from iapb.double_double import add_product, symmetric_entry
-from iapb.linalg import add_multiple, dot_of, from_whitened, to_momentum, to_whitened, whiten_columns
+from iapb.linalg import (
+    add_multiple,
+    dot_of,
+    from_whitened,
+    to_momentum,
+    to_whitened,
+    whiten_columns,
+)
 from iapb.schema import Floats
 
-# Two rows that differ by less than this (rows of unit length in the kinetic metric) count as one. The error of
-# restitution is then at most (1 + e) · tolerance · |u|. A larger tolerance would violate restitution at real contacts
-# (the kit requires 1e-8); a smaller one would treat rounding of a Jacobian (1e-16, amplified by √κ(M)) as a contact.
+# Two rows that differ by less than this (rows of unit length in the kinetic metric) count as one.
+# The error of restitution is then at most (1 + e) · tolerance · |u|. A larger tolerance would
+# violate restitution at real contacts (the kit requires 1e-8); a smaller one would treat rounding
+# of a Jacobian (1e-16, amplified by √κ(M)) as a contact.
 RANK_TOLERANCE = 1e-10
-_NOISE_FACTOR = 8.0  # rounding of a whitened row is below d · ε · κ(L) in all families tried; 8 is its margin
+_NOISE_FACTOR = (
+    8.0  # rounding of a whitened row is below d · ε · κ(L) in all families tried; 8 is its margin
+)
 
 
 class ImpactWork(NamedTuple):
@@ -30,7 +41,9 @@ class ImpactWork(NamedTuple):
     v: Annotated[Floats, "velocity"]  # v⁻
     v_plus: Annotated[Floats, "velocity"]
     momentum: Annotated[Floats, "velocity"]  # generalized impulse M(v⁺ − v⁻)
-    columns: Annotated[Floats, "velocity row"]  # rows of J as columns, then of A, then their residuals
+    columns: Annotated[
+        Floats, "velocity row"
+    ]  # rows of J as columns, then of A, then their residuals
     rows: Annotated[Floats, "velocity row"]  # unit rows of A as columns, kept for impulses
     length: Annotated[Floats, "row"]  # lengths of the rows of A
     basis: Annotated[Floats, "velocity velocity"]  # rows are the orthonormal basis Q
@@ -49,7 +62,8 @@ class ImpactWork(NamedTuple):
 
 @kernel
 def rank_tolerance(lower):
-    """Return the rank tolerance for rows whitened by L: RANK_TOLERANCE, or the rounding of the rows if it is larger."""
+    """Return the rank tolerance for rows whitened by L: RANK_TOLERANCE, or the rounding of the rows
+    if it is larger."""
     d = lower.shape[0]
     largest = smallest = lower[0, 0]
     for k in range(1, d):
@@ -60,7 +74,8 @@ def rank_tolerance(lower):
 
 @kernel
 def whiten_impact(d, count, work):
-    """Prepare an impact from v and `count` rows of J in `work.columns`: write u, unit rows of A, and their lengths.
+    """Prepare an impact from v and `count` rows of J in `work.columns`: write u, unit rows of A,
+    and their lengths.
 
     The unit rows go to `work.rows` and, in place of those of J, to `work.columns`.
     """
@@ -85,9 +100,14 @@ def factored_impact(d, count, restitution, tolerance, budget, clamped, work):
     """Resolve `count` rows, after `whiten_impact`, by (21) in factored form; return (rank, clamp).
 
     Writes v⁺ and the generalized impulse M(v⁺ − v⁻) = −(1 + e) L Q Qᵀ u.
-    Every row is an equality J v⁺ = −e J v⁻, whatever the sign of its velocity; the caller chooses the rows.
+    Every row is an equality J v⁺ = −e J v⁻, whatever the sign of its velocity; the caller chooses
+    the rows.
     """
-    rank, u, change = orthonormal_basis(d, count, tolerance, budget, work), work.u[:d], work.change[:d]
+    rank, u, change = (
+        orthonormal_basis(d, count, tolerance, budget, work),
+        work.u[:d],
+        work.change[:d],
+    )
     change[:] = 0.0
     for j in range(rank):
         add_multiple(change, -((1.0 + restitution) * dot_of(work.basis[j], u)), work.basis[j])
@@ -99,9 +119,11 @@ def factored_impact(d, count, restitution, tolerance, budget, clamped, work):
 
 @kernel
 def apply_change(d, clamped, work):
-    """Write v⁺ = v + α Δv and the generalized impulse α L Δu of `work`, where M Δv = L Δu (9); return α.
+    """Write v⁺ = v + α Δv and the generalized impulse α L Δu of `work`, where M Δv = L Δu (9);
+    return α.
 
-    With the clamp, v⁺ has no more kinetic energy than v in real arithmetic; α = 0 if no other α is found.
+    With the clamp, v⁺ has no more kinetic energy than v in real arithmetic; α = 0 if no other α is
+    found.
     """
     v, v_change, v_plus, alpha = work.v[:d], work.v_change[:d], work.v_plus[:d], 1.0
     if clamped:
@@ -118,20 +140,29 @@ def apply_change(d, clamped, work):
 
 # An error |E| of the factor below this share is left to the energy clamp; its effect is as small.
 _FELT = 1e-12
-_CONTRACTS = 0.1  # above this share the fixed-point iteration below may not converge; the clamp then ensures passivity
+# above this share the fixed-point iteration below may not converge; the clamp then ensures
+# passivity
+_CONTRACTS = 0.1
 _PASSES = 3  # each multiplies the remaining error by |E|, about d ε κ(M): 1e-3 at κ(M) = 1e12
 
 
 @kernel
 def refine_change(d, rank, work):
-    """Correct Δu = work.change of (21), in the span of the basis, and Δv = work.v_change for M instead of L Lᵀ.
+    """Correct Δu = work.change of (21), in the span of the basis, and Δv = work.v_change for M
+    instead of L Lᵀ.
 
-    In whitened coordinates M is I + E with |E| about d ε κ(M). The corrected Δu has the given part in the row space
-    (restitution), and its impulse (I + E) Δu lies in the row space. The iteration is Δu ← Δu₀ − (I − Q Qᵀ) E Δu, with
-    E Δu = L⁻¹ M Δv − Δu and M Δv summed in double-double. Without it the clamp alone would compensate E, which
-    reduces restitution. On return work.change is L⁻¹ of the generalized impulse.
+    In whitened coordinates M is I + E with |E| about d ε κ(M). The corrected Δu has the given part
+    in the row space (restitution), and its impulse (I + E) Δu lies in the row space. The iteration
+    is Δu ← Δu₀ − (I − Q Qᵀ) E Δu, with E Δu = L⁻¹ M Δv − Δu and M Δv summed in double-double.
+    Without it the clamp alone would compensate E, which reduces restitution. On return work.change
+    is L⁻¹ of the generalized impulse.
     """
-    change, deviation, inside, shifted = work.change[:d], work.deviation[:d], work.along[:d], work.shifted[:d]
+    change, deviation, inside, shifted = (
+        work.change[:d],
+        work.deviation[:d],
+        work.along[:d],
+        work.shifted[:d],
+    )
     for k in range(d):
         shifted[k], inside[k] = change[k], 0.0
     size, lower = dot_of(change, change), work.lower

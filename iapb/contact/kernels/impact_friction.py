@@ -1,17 +1,19 @@
-"""Dry friction in an impact: an extension of (15)-(21) that the paper leaves to future work. Linear in the contacts.
+"""Dry friction in an impact: an extension of (15)-(21) that the paper leaves to future work. Linear
+in the contacts.
 
-With u = Lᵀ v, rows A_n = J L⁻ᵀ and A_t = T L⁻ᵀ and P = Q Qᵀ the projector onto A_n's rows, the change of velocity is
-split into two orthogonal parts,
+With u = Lᵀ v, rows A_n = J L⁻ᵀ and A_t = T L⁻ᵀ and P = Q Qᵀ the projector onto A_n's rows, the
+change of velocity is split into two orthogonal parts,
 
     Δu = −(1 + e) P u  +  α Bᵀ p_t,      B = A_t (I − P).
 
-The first is the paper's impulse; its `ImpactWork` holds u, the change Δ_n and the basis Q. The second, which these
-kernels add, is a tangential impulse *together with the normal impulse that keeps every normal velocity at −e γ⁻*.
-Restitution is therefore met exactly, whatever the friction. p_t obeys Coulomb's law with the tangential velocity after
-the impact: stick, or slip with |p_t| = μ p_n against the velocity. α ≤ 1 is the largest factor for which the impact
-gains no energy. By orthogonality ΔKE(α) = −½(1−e²)|P u|² + α u·Bᵀp_t + ½ α² |Bᵀp_t|²; if ΔKE(1) > 0, α is the positive
-root of ΔKE. This excludes the energy gain that Kane and Levinson found for Newton's law with friction. If ΔKE(1) ≤ 0,
-then α = 1 and the impact obeys Coulomb's law.
+The first is the paper's impulse; its `ImpactWork` holds u, the change Δ_n and the basis Q. The
+second, which these kernels add, is a tangential impulse *together with the normal impulse that
+keeps every normal velocity at −e γ⁻*. Restitution is therefore met exactly, whatever the friction.
+p_t obeys Coulomb's law with the tangential velocity after the impact: stick, or slip with |p_t| = μ
+p_n against the velocity. α ≤ 1 is the largest factor for which the impact gains no energy. By
+orthogonality ΔKE(α) = −½(1−e²)|P u|² + α u·Bᵀp_t + ½ α² |Bᵀp_t|²; if ΔKE(1) > 0, α is the positive
+root of ΔKE. This excludes the energy gain that Kane and Levinson found for Newton's law with
+friction. If ΔKE(1) ≤ 0, then α = 1 and the impact obeys Coulomb's law.
 """
 
 from __future__ import annotations
@@ -27,11 +29,13 @@ from iapb.elementary import hypotenuse
 from iapb.linalg import add_multiple, dot_of, from_whitened, orthogonalize
 from iapb.schema import Floats
 
-GONE = 1e-13  # share of a tangent's row: a smaller part outside the span of the normal rows is rounding
+# share of a tangent's row: a smaller part outside the span of the normal rows is rounding
+GONE = 1e-13
 
 
 class FrictionWork(NamedTuple):
-    """Scratch of the friction of one impact: each row is a contact with 1 (planar) or 2 (spatial) tangents."""
+    """Scratch of the friction of one impact: each row is a contact with 1 (planar) or 2 (spatial)
+    tangents."""
 
     rows: Annotated[Floats, "tangent velocity"]  # tangents' rows of J, then of A, then B
     normal_part: Annotated[Floats, "tangent velocity"]  # A_t Qᵀ: the removed part, along the basis
@@ -39,14 +43,18 @@ class FrictionWork(NamedTuple):
     p: Annotated[Floats, "tangent"]  # tangential impulses [N s]
     block: Annotated[Floats, "row 3"]  # the entries xx, xy, yy of B_i B_iᵀ [1/kg]
     inertia: Annotated[Floats, "row"]  # its largest eigenvalue
-    response: Annotated[Floats, "tangent"]  # ∂p_n,i / ∂p_t,i by least norm: effect on its contact's p_n
+    response: Annotated[
+        Floats, "tangent"
+    ]  # ∂p_n,i / ∂p_t,i by least norm: effect on its contact's p_n
     coefficient: Annotated[Floats, "row"]  # μ
     limit: Annotated[Floats, "row"]  # Coulomb's limit μ p_n [N s]
     change: Annotated[Floats, "row"]  # change of each limit required by a round
     sliding: Annotated[Floats, "row"]  # μ; 0 where the frictionless normal impulse pulls
     without: Annotated[Floats, "row"]  # normal impulses without friction [N s]
     wanted: Annotated[Floats, "row"]  # normal impulses with friction
-    least: Annotated[Floats, "row"]  # of contacts that only push: smallest velocity after, along unit rows of A
+    least: Annotated[
+        Floats, "row"
+    ]  # of contacts that only push: smallest velocity after, along unit rows of A
     target: Annotated[Floats, "velocity"]  # Q Δ_n
     left: Annotated[Floats, "velocity"]
     moved: Annotated[Floats, "velocity"]  # Bᵀ p_t
@@ -55,16 +63,26 @@ class FrictionWork(NamedTuple):
 
 @kernel
 def add_impact_friction(d, count, rank, work, push, f, only_push, impulses):
-    """Add Coulomb friction to the normal impact in `work`; `f.rows` holds the tangents' rows of J, `f.coefficient` μ.
+    """Add Coulomb friction to the normal impact in `work`; `f.rows` holds the tangents' rows of J,
+    `f.coefficient` μ.
 
-    Writes v⁺, the generalized impulse, the normal impulses (count,) and the tangential ones, `f.p`; returns (share of
-    friction kept, clamp, whether Coulomb's law is met). Passive for every p_t, also before convergence. The share is α
-    times a factor that keeps p_t within the friction cones if no p_t obeys Coulomb's law.
-    only_push : whether contacts only push; `impulses` then holds the normal impulses of Poisson's law.
+    Writes v⁺, the generalized impulse, the normal impulses (count,) and the tangential ones, `f.p`;
+    returns (share of friction kept, clamp, whether Coulomb's law is met). Passive for every p_t,
+    also before convergence. The share is α times a factor that keeps p_t within the friction cones
+    if no p_t obeys Coulomb's law.
+    only_push : whether contacts only push; `impulses` then holds the normal impulses of Poisson's
+        law.
     """
-    p, u, change, moved = f.p[: count * f.velocity.shape[0]], work.u[:d], work.change[:d], f.moved[:d]
+    p, u, change, moved = (
+        f.p[: count * f.velocity.shape[0]],
+        work.u[:d],
+        work.change[:d],
+        f.moved[:d],
+    )
     lower, largest = work.lower, 0.0
-    for j in range(p.shape[0]):  # whiten the tangents' rows, and remove the span of the normal rows: B and A_t Qᵀ
+    for j in range(
+        p.shape[0]
+    ):  # whiten the tangents' rows, and remove the span of the normal rows: B and A_t Qᵀ
         row, slip = f.rows[j, :d], 0.0
         whiten_row(lower, row)
         for k in range(d):
@@ -73,7 +91,9 @@ def add_impact_friction(d, count, rank, work, push, f, only_push, impulses):
         largest = max(largest, before)
         if orthogonalize(row, work.basis, rank, f.normal_part[j]) <= GONE * GONE * before:
             row[:] = 0.0
-    scale = math.sqrt(largest) * math.sqrt(dot_of(u, u))  # of the rounding of a tangential velocity [m/s]
+    scale = math.sqrt(largest) * math.sqrt(
+        dot_of(u, u)
+    )  # of the rounding of a tangential velocity [m/s]
     met = settle_friction(count, rank, work, push, f, d, scale, only_push, impulses)
     share = share_within_cone(count, f)
     combine(count, f, d)
@@ -100,7 +120,8 @@ def whiten_row(lower, row):
 
 @kernel
 def share_within_cone(count, f):
-    """Return the largest β with β |p_t| ≤ μ p(β) at every contact; p(β) is linear between `without` and `wanted`."""
+    """Return the largest β with β |p_t| ≤ μ p(β) at every contact; p(β) is linear between `without`
+    and `wanted`."""
     size = f.velocity.shape[0]
     share, largest = 1.0, 0.0
     for i in range(count):
@@ -116,7 +137,8 @@ def share_within_cone(count, f):
 
 @kernel
 def passive_share(u, change, moved):
-    """Return the largest α in [0, 1] with ½|Δ_t|² α² + (u·Δ_t) α ≤ loss of the normal part: the sum gains no energy."""
+    """Return the largest α in [0, 1] with ½|Δ_t|² α² + (u·Δ_t) α ≤ loss of the normal part: the sum
+    gains no energy."""
     square, slope = dot_of(moved, moved), dot_of(u, moved)
     lost = max(0.0, -dot_of(u, change) - 0.5 * dot_of(change, change))
     if square == 0.0 or 0.5 * square + slope <= lost:
@@ -125,44 +147,58 @@ def passive_share(u, change, moved):
     return min(1.0, (root - slope) / square if slope <= 0.0 else 2.0 * lost / (root + slope))
 
 
-# Coulomb's law in an impact: an iteration for the tangential impulses p_t and the limits μ p_n, which depend on p_t.
+# Coulomb's law in an impact: an iteration for the tangential impulses p_t and the limits μ p_n,
+# which depend on p_t.
 #
-# Each round updates the normal impulses for p_t, then the limits, then p_t by a few sweeps. At redundant contacts the
-# normal impulses are not unique. The choice must be continuous in p_t, or the limits jump from round to round. The
-# iteration takes the non-negative impulses nearest to those of the round before, by alternating projections. If no
-# non-negative impulses produce the motion (some contact pulls), it takes those of least norm, which are linear in p_t.
+# Each round updates the normal impulses for p_t, then the limits, then p_t by a few sweeps. At
+# redundant contacts the normal impulses are not unique. The choice must be continuous in p_t, or
+# the limits jump from round to round. The iteration takes the non-negative impulses nearest to
+# those of the round before, by alternating projections. If no non-negative impulses produce the
+# motion (some contact pulls), it takes those of least norm, which are linear in p_t.
 
-# Largest number of rounds. Convergence usually takes 3 to 30; an iteration that has not converged by then oscillates or
-# diverges (no solution), or no non-negative impulses exist.
+# Largest number of rounds. Convergence usually takes 3 to 30; an iteration that has not converged
+# by then oscillates or diverges (no solution), or no non-negative impulses exist.
 ROUNDS = 200
-UNDAMPED, HALVED = 20, 120  # rounds after which limits move half way only, then a fifth: large μ can make them swing
+UNDAMPED, HALVED = (
+    20,
+    120,
+)  # rounds after which limits move half way only, then a fifth: large μ can make them swing
 HALF, FIFTH = 0.5, 0.2
-STRIDE = 10.0  # largest over-relaxation of a limit, for friction that loads its own contact, μ ∂p_n/∂p_t → 1
+# largest over-relaxation of a limit, for friction that loads its own contact, μ ∂p_n/∂p_t → 1
+STRIDE = 10.0
 AT_LIMIT = 0.99  # share of a limit: a contact below it sticks
-# Share of the speeds that a slip is summed from: a round with smaller changes is the last one. Some thousand roundings.
+# Share of the speeds that a slip is summed from: a round with smaller changes is the last one. Some
+# thousand roundings.
 STILL = 1e-12
-# Tolerance for Coulomb's law, the same as for restitution: rows that differ by less count as one (RANK_TOLERANCE).
+# Tolerance for Coulomb's law, the same as for restitution: rows that differ by less count as one
+# (RANK_TOLERANCE).
 MET = 1e-10
-# Sweeps of p_t in a round, as the limits change anyway: until one changes velocities by a tenth of the first.
+# Sweeps of p_t in a round, as the limits change anyway: until one changes velocities by a tenth of
+# the first.
 SWEEPS, SETTLED = 10, 0.1
 HELD_SWEEPS = 200  # with the limits held for good
-# Sweeps over normal impulses and friction. Nearly parallel contacts share their load anew for thousands of sweeps, long
-# after the velocities are right. Of 54 impacts that the rounds failed to settle, 200 sweeps end 52 within a thousandth
-# of |u| of what 20,000 give, and the others within 4e-3.
+# Sweeps over normal impulses and friction. Nearly parallel contacts share their load anew for
+# thousands of sweeps, long after the velocities are right. Of 54 impacts that the rounds failed to
+# settle, 200 sweeps end 52 within a thousandth of |u| of what 20,000 give, and the others within
+# 4e-3.
 IMPACT_SWEEPS = 200
 SWEPT = 3e-3  # share of |u|: the sweeps have settled if the last one changed velocities by less
-PUSHES = 1e-9  # share of the normal impulse that non-negative impulses may miss: rounding of the active set
-# Of the largest normal impulse: friction may exceed a limit by this, the rounding of impulses that cancel.
+# share of the normal impulse that non-negative impulses may miss: rounding of the active set
+PUSHES = 1e-9
+# Of the largest normal impulse: friction may exceed a limit by this, the rounding of impulses that
+# cancel.
 CONE_ROUNDING = 1e-12
 TRIMS = 5  # each removes the excess over the cones and leaves a share of μ of it
 
 
 @kernel
 def settle_friction(count, rank, work, push, f, d, scale, only_push, impulses):
-    """Write p_t of Coulomb's law and the normal impulses without and with it; return whether the law is met within MET.
+    """Write p_t of Coulomb's law and the normal impulses without and with it; return whether the
+    law is met within MET.
 
-    If it is not, p_t maximizes the dissipation under the limits of the frictionless impact, a convex problem. Contacts
-    that only push get no limits from impulses that pull: these brace one another, and friction would stop anything.
+    If it is not, p_t maximizes the dissipation under the limits of the frictionless impact, a
+    convex problem. Contacts that only push get no limits from impulses that pull: these brace one
+    another, and friction would stop anything.
     scale : speed [m/s] to which STILL and MET are relative.
     """
     size = f.velocity.shape[0]
@@ -177,7 +213,9 @@ def settle_friction(count, rank, work, push, f, d, scale, only_push, impulses):
     for i in range(count):
         f.without[i] = f.wanted[i] = impulses[i] if only_push else f.wanted[i]
         f.limit[i] = 0.0
-        f.sliding[i] = f.coefficient[i] if f.without[i] > 0.0 else 0.0  # contacts that pull get no friction
+        f.sliding[i] = (
+            f.coefficient[i] if f.without[i] > 0.0 else 0.0
+        )  # contacts that pull get no friction
     if not only_push and _settle(count, rank, work, f, d, scale, False):
         _trim(count, rank, work, f, False)
         return True
@@ -190,10 +228,12 @@ def settle_friction(count, rank, work, push, f, d, scale, only_push, impulses):
 
 @kernel
 def sweep_impact(d, count, work, f, impulses):
-    """Sweep over contacts that only push, velocity ≥ `f.least`, with friction; return (clamp, whether this settled).
+    """Sweep over contacts that only push, velocity ≥ `f.least`, with friction; return (clamp,
+    whether this settled).
 
-    A sweep sets each normal impulse, then the friction within its limit. Where the sweeps settle without a gain of
-    energy, the result is written as by `add_impact_friction`; else all but scratch stays as it is.
+    A sweep sets each normal impulse, then the friction within its limit. Where the sweeps settle
+    without a gain of energy, the result is written as by `add_impact_friction`; else all but
+    scratch stays as it is.
     impulses : (≥count,) of the result so far, from which the sweeps start, as they do from `f.p`.
     """
     size, u, moved, p_n = f.velocity.shape[0], work.u[:d], f.moved[:d], f.wanted
@@ -236,7 +276,8 @@ def sweep_impact(d, count, work, f, impulses):
 
 @kernel
 def _start(count, rank, work, push, f, d):
-    """Factor the normal rows and write the impulses without friction; return whether non-negative ones exist."""
+    """Factor the normal rows and write the impulses without friction; return whether non-negative
+    ones exist."""
     change, left, size = work.change[:d], f.left[:d], f.velocity.shape[0]
     length = math.sqrt(dot_of(change, change))
     for k in range(d):
@@ -246,7 +287,9 @@ def _start(count, rank, work, push, f, d):
     minimum_norm_factors(d, count, rank, work.length, work)
     for j in range(rank):
         f.target[j] = dot_of(work.basis[j], change)
-    for j in range(count * size):  # ∂p_n,i / ∂p_t,i: the change of a contact's normal impulse with its own friction
+    for j in range(
+        count * size
+    ):  # ∂p_n,i / ∂p_t,i: the change of a contact's normal impulse with its own friction
         for i in range(rank):
             f.left[i] = -f.normal_part[j, i]
         f.wanted[:count] = 0.0
@@ -257,13 +300,16 @@ def _start(count, rank, work, push, f, d):
     for i in range(count):
         f.without[i] = length * f.without[i] / work.length[i] if work.length[i] > 0.0 else 0.0
         f.sliding[i], f.limit[i] = f.coefficient[i], 0.0
-    _move_normals(count, rank, work, f, False)  # an active set loads only a few of redundant contacts
+    _move_normals(
+        count, rank, work, f, False
+    )  # an active set loads only a few of redundant contacts
     return True
 
 
 @kernel
 def _move_normals(count, rank, work, f, near):
-    """Move `f.wanted` to the nearest normal impulses consistent with p_t, or those of least norm; return the defect."""
+    """Move `f.wanted` to the nearest normal impulses consistent with p_t, or those of least norm;
+    return the defect."""
     left, defect = f.left[:rank], 0.0
     copy_into(left, f.target)
     for j in range(count * f.velocity.shape[0]):
@@ -283,8 +329,13 @@ def _move_normals(count, rank, work, f, near):
 
 @kernel
 def _settle(count, rank, work, f, d, scale, pushes):
-    """Iterate normal impulses, limits and p_t; return whether the last round changed less than MET times the scale."""
-    size, speed, still = f.velocity.shape[0], math.sqrt(dot_of(work.u[:d], work.u[:d])), STILL * scale
+    """Iterate normal impulses, limits and p_t; return whether the last round changed less than MET
+    times the scale."""
+    size, speed, still = (
+        f.velocity.shape[0],
+        math.sqrt(dot_of(work.u[:d], work.u[:d])),
+        STILL * scale,
+    )
     moved = math.inf
     for done in range(ROUNDS):
         defect = _move_normals(count, rank, work, f, pushes)
@@ -294,7 +345,9 @@ def _settle(count, rank, work, f, d, scale, pushes):
                 f.wanted[i] = max(f.wanted[i], 0.0)
             own, stride = f.p[i * size : (i + 1) * size], 1.0
             length = math.sqrt(dot_of(own, own))
-            if length > 0.0 and length >= AT_LIMIT * f.limit[i]:  # Newton's step for a single sliding contact
+            if (
+                length > 0.0 and length >= AT_LIMIT * f.limit[i]
+            ):  # Newton's step for a single sliding contact
                 gain = f.sliding[i] * dot_of(f.response[i * size : (i + 1) * size], own) / length
                 stride = 1.0 / max(1.0 - gain, 1.0 / STRIDE)
             f.change[i] = f.sliding[i] * max(f.wanted[i], 0.0) - f.limit[i]
@@ -316,7 +369,8 @@ def _settle(count, rank, work, f, d, scale, pushes):
 
 @kernel
 def _trim(count, rank, work, f, near):
-    """Shorten each contact's p_t that the last round left outside its cone, and update the normal impulses."""
+    """Shorten each contact's p_t that the last round left outside its cone, and update the normal
+    impulses."""
     size, largest = f.velocity.shape[0], 0.0
     for turn in range(TRIMS + 1):
         _move_normals(count, rank, work, f, near)
@@ -337,9 +391,11 @@ def _trim(count, rank, work, f, near):
             f.wanted[i] = 0.0
 
 
-# Tangential impulses within Coulomb's discs: sweeps over the contacts; each contact stops or slides at its limit.
+# Tangential impulses within Coulomb's discs: sweeps over the contacts; each contact stops or slides
+# at its limit.
 
-# sin² of the angle between two tangents' rows; below it one row is a multiple of the other, up to rounding.
+# sin² of the angle between two tangents' rows; below it one row is a multiple of the other, up to
+# rounding.
 SINGULAR = 1e-12
 
 
@@ -364,11 +420,13 @@ def combine(count, f, d):
 
 @kernel
 def friction_sweeps(count, f, d, sweeps, still):
-    """Sweep over the contacts: set p_i so that w_i = 0 if its disc allows this, else to proj(p_i − w_i / ρ_i).
+    """Sweep over the contacts: set p_i so that w_i = 0 if its disc allows this, else to proj(p_i −
+    w_i / ρ_i).
 
-    w = speed + B moved is the tangential velocity, moved = Bᵀ p, proj projects on the disc of radius limit_i. p and
-    moved change in place; each sweep combines moved anew, so that rounding does not add up. Stops after a sweep
-    that changes no velocity by more than `still`; returns the largest change of the last one [m/s].
+    w = speed + B moved is the tangential velocity, moved = Bᵀ p, proj projects on the disc of
+    radius limit_i. p and moved change in place; each sweep combines moved anew, so that rounding
+    does not add up. Stops after a sweep that changes no velocity by more than `still`; returns the
+    largest change of the last one [m/s].
     """
     fastest = 0.0
     for _ in range(sweeps):
@@ -384,7 +442,8 @@ def friction_sweeps(count, f, d, sweeps, still):
 
 @kernel
 def _slide(f, i, d):
-    """Move one contact's impulse to stop its slip, or towards its limit; return the change of velocity [m/s]."""
+    """Move one contact's impulse to stop its slip, or towards its limit; return the change of
+    velocity [m/s]."""
     velocity, size, moved = f.velocity, f.velocity.shape[0], f.moved[:d]
     first, limit, inertia = i * size, f.limit[i], f.inertia[i]
     for a in range(size):
@@ -409,8 +468,11 @@ def _slide(f, i, d):
 
 @kernel
 def _stops(f, i, first):
-    """Write into `velocity` the impulse that stops a contact with two tangents; False if it exceeds the limit."""
-    if f.velocity.shape[0] != 2:  # of two, steps of length 1/ρ would need κ(B_i B_iᵀ) sweeps; with a lever, hundreds
+    """Write into `velocity` the impulse that stops a contact with two tangents; False if it exceeds
+    the limit."""
+    if (
+        f.velocity.shape[0] != 2
+    ):  # of two, steps of length 1/ρ would need κ(B_i B_iᵀ) sweeps; with a lever, hundreds
         return False
     xx, xy, yy, v, w = f.block[i, 0], f.block[i, 1], f.block[i, 2], f.velocity[0], f.velocity[1]
     det = xx * yy - xy * xy

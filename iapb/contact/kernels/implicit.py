@@ -1,19 +1,24 @@
-"""Resting contact, implicit in the velocity: the forces of a step act at its end, so no stiffness makes energy.
+"""Resting contact, implicit in the velocity: the forces of a step act at its end, so no stiffness
+makes energy.
 
-v* is the velocity after impulses and applied forces. Over the contacts of a group, with γ = J v and gap φ <= 0,
+v* is the velocity after impulses and applied forces. Over the contacts of a group, with γ = J v and
+gap φ <= 0,
 
-    v⁺ = argmin ½ (v − v*)ᵀ M (v − v*) + Σ Δt f(γ)²/2k + Σ c h(|w|),   f = max(0, −K φ − k γ),   k = K Δt + B,
+    v⁺ = argmin ½ (v − v*)ᵀ M (v − v*) + Σ Δt f(γ)²/2k + Σ c h(|w|),   f = max(0, −K φ − k γ),   k =
+    K Δt + B,
 
-w the tangential velocities, c = μ Δt f the limit of friction, and h(|w|) = |w|, rounded below the speed STICKING so
-that it has a derivative: a contact that sticks creeps more slowly than that. The function is strictly convex: one
-answer, also where contacts are redundant. M contains Δt D of damped joints. Newton's method with a line search solves
-it, from the velocity before the step's forces, which at rest is the answer.
-The limits of friction follow from the forces, so both are solved in turns; any limit c >= 0 dissipates.
-A gap that bends over the step (a ball in a drum, a slider on a turning arm) closes by ½ Δt² of an acceleration more
-than by Δt γ. What it closed more in the step before is added to γ in f; without this the contact would sink.
+w the tangential velocities, c = μ Δt f the limit of friction, and h(|w|) = |w|, rounded below the
+speed STICKING so that it has a derivative: a contact that sticks creeps more slowly than that. The
+function is strictly convex: one answer, also where contacts are redundant. M contains Δt D of
+damped joints. Newton's method with a line search solves it, from the velocity before the step's
+forces, which at rest is the answer. The limits of friction follow from the forces, so both are
+solved in turns; any limit c >= 0 dissipates. A gap that bends over the step (a ball in a drum, a
+slider on a turning arm) closes by ½ Δt² of an acceleration more than by Δt γ. What it closed more
+in the step before is added to γ in f; without this the contact would sink.
 
-Where a gap is linear over the step, KE⁺ + Φ⁺ <= KE* + Φ with Φ = Σ ½ K min(φ, 0)², for every K, B >= 0 and Δt > 0
-(`verification.proofs`). A solution that is not accurate enough to show this in numbers is shortened until it does.
+Where a gap is linear over the step, KE⁺ + Φ⁺ <= KE* + Φ with Φ = Σ ½ K min(φ, 0)², for every K, B
+>= 0 and Δt > 0 (`verification.proofs`). A solution that is not accurate enough to show this in
+numbers is shortened until it does.
 """
 
 from __future__ import annotations
@@ -27,12 +32,16 @@ from iapb.contact.kernels.rows import friction_of, tangent_of, write_pair_row
 from iapb.linalg import add, add_multiple, dot_of, load, scale, store
 from iapb.schema import Floats, Integers
 
-STICKING = 1e-10  # m/s: a contact that slips more slowly sticks, with a friction in proportion to its slip
+STICKING = (
+    1e-10  # m/s: a contact that slips more slowly sticks, with a friction in proportion to its slip
+)
 EXACT = 1e-20  # share of the energy of a step that the open balance of momentum may give the bodies
 GOOD = 1e-14  # the same, where rounding allows no better
 ITERATIONS = 60  # of Newton's method for given limits of friction
 TURNS = 12  # of the limits of friction in a step; the next step goes on from the last ones
-FREE_TURNS = 3  # of these take the new limits whole; the others half, for limits that swing to and fro
+FREE_TURNS = (
+    3  # of these take the new limits whole; the others half, for limits that swing to and fro
+)
 SETTLED = 1e-3  # share of a limit of friction whose change ends the turns
 SEARCHES = 40  # evaluations of a line search
 GAIN = 1e-11  # share of the energy of a step that rounding may seem to create
@@ -41,18 +50,22 @@ GAIN = 1e-11  # share of the energy of a step that rounding may seem to create
 class RestWork(NamedTuple):
     """Scratch of resting contact, implicit in the velocity, of one group (`rest_group`).
 
-    Each contact has a row for the normal and, with friction, for each tangent. Local coordinates number those of the
-    group. `width` is twice the number of coordinates of the largest tree.
+    Each contact has a row for the normal and, with friction, for each tangent. Local coordinates
+    number those of the group. `width` is twice the number of coordinates of the largest tree.
     """
 
     contact: Annotated[Integers, "contact"]  # contacts of the group
     at: Annotated[Integers, "contact 2"]  # first local coordinate of each of their two trees
-    size: Annotated[Integers, "contact 2"]  # number of coordinates of these; 0 = no tree, or the first one again
+    size: Annotated[
+        Integers, "contact 2"
+    ]  # number of coordinates of these; 0 = no tree, or the first one again
     rows: Annotated[Floats, "row width"]  # rows of J: one half for each of the two trees
     speed: Annotated[Floats, "row"]  # J v [m/s]
     p: Annotated[Floats, "row"]  # impulses of the step [N s]
     limit: Annotated[Floats, "contact"]  # limits c = μ F_n Δt of friction [N s]
-    bend: Annotated[Floats, "contact"]  # what the gap closed or opened more than Δt J v in the step before, by Δt [m/s]
+    bend: Annotated[
+        Floats, "contact"
+    ]  # what the gap closed or opened more than Δt J v in the step before, by Δt [m/s]
     first: Annotated[Integers, "tree"]  # first contact of each group, by its first tree, −1 = none
     next: Annotated[Integers, "contact"]  # contact of the same group that follows, −1 = none
     next_tree: Annotated[Integers, "tree"]  # tree of the same group that follows, −1 = none
@@ -60,7 +73,9 @@ class RestWork(NamedTuple):
     dof: Annotated[Integers, "velocity"]  # the coordinate v[dof] of each local one
     begin: Annotated[Integers, "velocity"]  # first local coordinate of its tree
     end: Annotated[Integers, "velocity"]  # and the one after the last
-    envelope: Annotated[Integers, "velocity"]  # first nonzero column of each row of the Newton matrix
+    envelope: Annotated[
+        Integers, "velocity"
+    ]  # first nonzero column of each row of the Newton matrix
     change: Annotated[Floats, "row"]  # J Δv of a Newton step
     v: Annotated[Floats, "velocity"]  # local velocities
     free: Annotated[Floats, "velocity"]  # v*
@@ -74,7 +89,8 @@ class RestWork(NamedTuple):
 
 @kernel(needs="implicit")
 def rest_implicitly(world, state, rubs):
-    """Give v the forces of all resting contacts; write them to the contacts, to penalty_force and friction_force."""
+    """Give v the forces of all resting contacts; write them to the contacts, to penalty_force and
+    friction_force."""
     work, contacts, some = state.rest_work, state.contacts, False
     work.first[:] = -1
     for i in range(state.contact_count[0] - 1, -1, -1):
@@ -129,7 +145,13 @@ def rest_group(world, state, group, s):
 @kernel
 def gather_contacts(world, state, group, s):
     """Write rows, limits and softness of the group's contacts; return their number."""
-    work, contacts, count, begin, i = state.rest_work, state.contacts, 0, 0, state.rest_work.first[group]
+    work, contacts, count, begin, i = (
+        state.rest_work,
+        state.contacts,
+        0,
+        0,
+        state.rest_work.first[group],
+    )
     while i >= 0:
         work.contact[count], work.limit[count], work.bend[count] = i, 0.0, 0.0
         trees = trees_of_contact(world, work, contacts, i, count)
@@ -154,7 +176,8 @@ def gather_contacts(world, state, group, s):
 
 @kernel
 def trees_of_contact(world, work, contacts, i, r):
-    """Return the two trees of contact i, the second −1: none, or the same; write what row r needs of them to `work`."""
+    """Return the two trees of contact i, the second −1: none, or the same; write what row r needs
+    of them to `work`."""
     a, b = world.tree_of_body[contacts.body_a[i]], contacts.body_b[i]
     trees = (a, -1 if b < 0 or world.tree_of_body[b] == a else world.tree_of_body[b])
     for side in range(2):
@@ -166,7 +189,8 @@ def trees_of_contact(world, work, contacts, i, r):
 
 @kernel
 def along_row(work, r, j, v):
-    """Return row j, of contact r, times v; each half of the row holds the entries of one of the contact's two trees."""
+    """Return row j, of contact r, times v; each half of the row holds the entries of one of the
+    contact's two trees."""
     total, row, half = 0.0, work.rows[j], work.rows.shape[1] // 2
     for side in range(2):
         at = work.at[r, side]
@@ -217,14 +241,18 @@ def mass_form(world, state, size, v, w):
 
 @kernel
 def push(world, state, r, k, gamma):
-    """Return the normal impulse Δt f of contact r at the normal velocity γ, to which the bend of the gap is added."""
+    """Return the normal impulse Δt f of contact r at the normal velocity γ, to which the bend of
+    the gap is added."""
     work = state.rest_work
-    return world.dt * max(0.0, -world.stiffness * state.contacts.gap[work.contact[r]] - k * (gamma + work.bend[r]))
+    return world.dt * max(
+        0.0, -world.stiffness * state.contacts.gap[work.contact[r]] - k * (gamma + work.bend[r])
+    )
 
 
 @kernel
 def slide_length(work, r, s, share):
-    """Return |w| at `share` of the present step, and the divisor of w that gives −p: max(|w|, STICKING)/c."""
+    """Return |w| at `share` of the present step, and the divisor of w that gives −p: max(|w|,
+    STICKING)/c."""
     square = 0.0
     for j in range(r * s + 1, (r + 1) * s):
         w = work.speed[j] + share * work.change[j]
@@ -248,7 +276,8 @@ def set_impulses(world, state, count, s, k, share):
 
 @kernel
 def slope(world, state, count, s, k, share, linear, quadratic):
-    """Write the impulses at `share` of the Newton step; return the derivative of the minimised function along it."""
+    """Write the impulses at `share` of the Newton step; return the derivative of the minimised
+    function along it."""
     total = linear + share * quadratic
     set_impulses(world, state, count, s, k, share)
     for j in range(count * s):
@@ -258,7 +287,8 @@ def slope(world, state, count, s, k, share, linear, quadratic):
 
 @kernel
 def open_balance(world, state, size, count, s, k):
-    """Write impulses and balance M (v − v*) − Jᵀ p at v; return the energy that the balance would give the bodies.
+    """Write impulses and balance M (v − v*) − Jᵀ p at v; return the energy that the balance would
+    give the bodies.
 
     It is a share of the energy of the step, that of v* and of the springs.
     """
@@ -339,7 +369,8 @@ def newton_matrix(world, state, size, count, s, k):
 
 @kernel
 def factor_envelope(matrix, envelope, size):
-    """Overwrite the lower triangle by its Cholesky factor, inverse diagonal; False: a pivot is not positive."""
+    """Overwrite the lower triangle by its Cholesky factor, inverse diagonal; False: a pivot is not
+    positive."""
     for i in range(size):
         row = matrix[i]
         for j in range(envelope[i], i):
@@ -372,7 +403,8 @@ def solve_envelope(matrix, envelope, size, x):
 
 @kernel
 def solve(world, state, size, count, s, k):
-    """Minimise for the present limits of friction, from work.v; return whether the balance is solved."""
+    """Minimise for the present limits of friction, from work.v; return whether the balance is
+    solved."""
     work = state.rest_work
     v, step = work.v[:size], work.step[:size]
     worst = open_balance(world, state, size, count, s, k)
@@ -401,20 +433,25 @@ def solve(world, state, size, count, s, k):
 
 @kernel
 def is_quadratic(world, state, count, s, k):
-    """Return whether the same contacts push at the end of the Newton step as before, and all with friction stick."""
+    """Return whether the same contacts push at the end of the Newton step as before, and all with
+    friction stick."""
     work = state.rest_work
     for r in range(count):
         j = r * s
         if (work.p[j] > 0.0) != (push(world, state, r, k, work.speed[j] + work.change[j]) > 0.0):
             return False
-        if work.limit[r] > 0.0 and max(slide_length(work, r, s, 0.0)[0], slide_length(work, r, s, 1.0)[0]) > STICKING:
+        if (
+            work.limit[r] > 0.0
+            and max(slide_length(work, r, s, 0.0)[0], slide_length(work, r, s, 1.0)[0]) > STICKING
+        ):
             return False
     return True
 
 
 @kernel
 def line_search(world, state, size, count, s, k):
-    """Return the share of the Newton step at which the slope vanishes, 1 if it is still negative there."""
+    """Return the share of the Newton step at which the slope vanishes, 1 if it is still negative
+    there."""
     work = state.rest_work
     linear = mass_form(world, state, size, work.change_of_v, work.step)
     quadratic = mass_form(world, state, size, work.step, work.step)
@@ -438,14 +475,19 @@ def line_search(world, state, size, count, s, k):
 
 @kernel
 def follow_limits(world, state, count, s, share):
-    """Move the limits of friction by a share towards those of the present impulses; False: none changed noticeably."""
+    """Move the limits of friction by a share towards those of the present impulses; False: none
+    changed noticeably."""
     work, changed, largest = state.rest_work, False, 0.0
     for r in range(count):
         largest = max(largest, work.p[r * s])
     for r in range(count):
         limit = friction_of(world, state.contacts, work.contact[r]) * work.p[r * s]
         most = max(limit, work.limit[r])
-        changed = changed or abs(limit - work.limit[r]) > SETTLED * most and most > SETTLED * SETTLED * largest
+        changed = (
+            changed
+            or abs(limit - work.limit[r]) > SETTLED * most
+            and most > SETTLED * SETTLED * largest
+        )
         work.limit[r] += share * (limit - work.limit[r])
     return changed
 
@@ -462,11 +504,17 @@ def spring_energy(world, state, count, s, share):
 
 @kernel
 def guard(world, state, size, count, s):
-    """Shorten a solution that would make energy: with share 0, everything stands still and Φ stays as it is."""
+    """Shorten a solution that would make energy: with share 0, everything stands still and Φ stays
+    as it is."""
     work, share = state.rest_work, 1.0
     after = 0.5 * mass_form(world, state, size, work.v, work.v)
-    allowed = (free_energy(world, state, size) + spring_energy(world, state, count, s, 0.0)) * (1.0 + GAIN)
-    while share > 0.0 and after * share * share + spring_energy(world, state, count, s, share) > allowed:
+    allowed = (free_energy(world, state, size) + spring_energy(world, state, count, s, 0.0)) * (
+        1.0 + GAIN
+    )
+    while (
+        share > 0.0
+        and after * share * share + spring_energy(world, state, count, s, share) > allowed
+    ):
         share = 0.5 * share if share > 1e-3 else 0.0
     if share < 1.0:
         work.shortened[0] += 1
@@ -476,7 +524,8 @@ def guard(world, state, size, count, s):
 
 @kernel
 def give_back(world, state, size, count, s):
-    """Write the group's velocity to v, and the forces to the contacts and the generalized forces."""
+    """Write the group's velocity to v, and the forces to the contacts and the generalized
+    forces."""
     work, contacts = state.rest_work, state.contacts
     pushed, rubbed = work.given[:size], work.step[:size]
     for i in range(size):

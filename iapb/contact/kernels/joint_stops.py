@@ -1,8 +1,10 @@
-"""Ends of the joints' ranges as contacts: impulses and penalty forces act at a joint's limit as at any contact.
+"""Ends of the joints' ranges as contacts: impulses and penalty forces act at a joint's limit as at
+any contact.
 
-A revolute joint with axis a moves a point on an arm of length r with a × r. The contact of this point with the
-joint's parent along n = ± a × r/|r| has the row nᵀJ = ± r e_k: the velocity of this joint alone. A prismatic
-joint slides along its axis, and the row is ± e_k. Impulses, penalty forces and records then treat a limit as a contact.
+A revolute joint with axis a moves a point on an arm of length r with a × r. The contact of this
+point with the joint's parent along n = ± a × r/|r| has the row nᵀJ = ± r e_k: the velocity of this
+joint alone. A prismatic joint slides along its axis, and the row is ± e_k. Impulses, penalty forces
+and records then treat a limit as a contact.
 """
 
 from __future__ import annotations
@@ -14,13 +16,15 @@ from iapb.linalg import add, cross, load, scale, store
 
 @kernel
 def is_stop(contacts, i):
-    """Return whether contact i is the end of a joint's range: both of its shapes have the same number."""
+    """Return whether contact i is the end of a joint's range: both of its shapes have the same
+    number."""
     return contacts.shape_a[i] == contacts.shape_b[i]
 
 
 @kernel(needs="joint_limits", otherwise=0)
 def add_stops(world, state, contacts, count):
-    """Append the stops that are reached after `count` contacts; return the new count, −1 if there is no room."""
+    """Append the stops that are reached after `count` contacts; return the new count, −1 if there
+    is no room."""
     stops, w = world.stops, state.body
     for i in range(stops.bound.shape[0]):
         gap = stops.arm[i] * stops.sign[i] * (state.q[stops.coordinate[i]] - stops.bound[i])

@@ -1,8 +1,9 @@
-"""Narrow phase: contacts of candidate pairs of shapes from the poses of their bodies; this module has planar pairs.
+"""Narrow phase: contacts of candidate pairs of shapes from the poses of their bodies; this module
+has planar pairs.
 
-Every contact has a unit normal from b into a, a gap (negative = overlap) along it, and a point midway between
-the two surfaces, so that swapping the two shapes negates the normal and changes nothing else. A contact is
-kept when gap <= margin. Nothing is allocated.
+Every contact has a unit normal from b into a, a gap (negative = overlap) along it, and a point
+midway between the two surfaces, so that swapping the two shapes negates the normal and changes
+nothing else. A contact is kept when gap <= margin. Nothing is allocated.
 """
 
 from __future__ import annotations
@@ -28,10 +29,12 @@ from iapb.elementary import hypotenuse
 
 @kernel
 def detect(shapes, pairs, R, p, margin, buffer):
-    """Write the contacts of all pairs into `buffer`; return how many, or -1 if its capacity is exceeded.
+    """Write the contacts of all pairs into `buffer`; return how many, or -1 if its capacity is
+    exceeded.
 
     shapes : Shapes; pairs : (k, 2); R (nb, 3, 3), p (nb, 3) : world placements of the bodies
-    margin : float [m], contacts with gap <= margin are kept; 0 keeps overlaps and exact contact only
+    margin : float [m], contacts with gap <= margin are kept; 0 keeps overlaps and exact contact
+        only
     buffer : ContactBuffer; only its geometric fields are written
     """
     count = 0
@@ -67,7 +70,8 @@ def following(shapes, shape, i):
 
 @kernel
 def vertices_half_plane(shapes, a, b, R, p, margin, buffer, count):
-    """Write one contact per vertex of polygon a, or one for circle a: gap = (vertex - point)·normal - radius."""
+    """Write one contact per vertex of polygon a, or one for circle a: gap = (vertex - point)·normal
+    - radius."""
     (x0, y0), (nx, ny), radius = corner(shapes, b, 0), corner(shapes, b, 1), shapes.radius[a]
     frame = placement(shapes.body[a], R, p)
     mx, my = frame[0] * nx + frame[2] * ny, frame[1] * nx + frame[3] * ny  # the normal in a's frame
@@ -76,10 +80,22 @@ def vertices_half_plane(shapes, a, b, R, p, margin, buffer, count):
         x, y = corner(shapes, a, i)
         gap = mx * x + my * y + offset
         if gap <= margin:
-            depth = radius + 0.5 * gap  # from the vertex (or centre) back to midway between the surfaces
+            depth = (
+                radius + 0.5 * gap
+            )  # from the vertex (or centre) back to midway between the surfaces
             x, y = place(frame, x, y)
-            count = store_contact(shapes, a, b, True, vertex_feature(0, i, 0), (x - depth * nx, y - depth * ny, 0.0),
-                                  (nx, ny, 0.0), gap, buffer, count)
+            count = store_contact(
+                shapes,
+                a,
+                b,
+                True,
+                vertex_feature(0, i, 0),
+                (x - depth * nx, y - depth * ny, 0.0),
+                (nx, ny, 0.0),
+                gap,
+                buffer,
+                count,
+            )
     return count
 
 
@@ -93,7 +109,10 @@ def circle_polygon(shapes, circle, polygon, circle_is_a, R, p, margin, buffer, c
     x, y = place(relative_frame(shapes, polygon, circle, R, p), x, y)
     best, edge, nx, ny = -math.inf, 0, 0.0, 1.0
     for i in range(shapes.count[polygon]):
-        (ux, uy), (wx, wy) = corner(shapes, polygon, i), corner(shapes, polygon, following(shapes, polygon, i))
+        (ux, uy), (wx, wy) = (
+            corner(shapes, polygon, i),
+            corner(shapes, polygon, following(shapes, polygon, i)),
+        )
         ex, ey = wx - ux, wy - uy
         length = hypotenuse(ex, ey)
         distance = ((x - ux) * ey - (y - uy) * ex) / length
@@ -102,7 +121,10 @@ def circle_polygon(shapes, circle, polygon, circle_is_a, R, p, margin, buffer, c
             if best - shapes.radius[circle] > margin:
                 return count
     feature = vertex_feature(1, 0, edge)
-    (ux, uy), (wx, wy) = corner(shapes, polygon, edge), corner(shapes, polygon, following(shapes, polygon, edge))
+    (ux, uy), (wx, wy) = (
+        corner(shapes, polygon, edge),
+        corner(shapes, polygon, following(shapes, polygon, edge)),
+    )
     ex, ey = wx - ux, wy - uy
     before, beyond = (x - ux) * ex + (y - uy) * ey < 0.0, (x - wx) * ex + (y - wy) * ey > 0.0
     if best > 0.0 and (before or beyond):  # an end of the edge is nearer
@@ -111,26 +133,41 @@ def circle_polygon(shapes, circle, polygon, circle_is_a, R, p, margin, buffer, c
         best = hypotenuse(x - ux, y - uy)
         nx, ny, feature = (x - ux) / best, (y - uy) / best, vertex_feature(2, end, 0)
     nx, ny = turn_to_world(nx, ny, shapes.body[polygon], R)
-    return ball_on_surface(shapes, circle, polygon, circle_is_a, world_center(shapes, circle, R, p), (nx, ny, 0.0),
-                           best, feature, margin, buffer, count)
+    return ball_on_surface(
+        shapes,
+        circle,
+        polygon,
+        circle_is_a,
+        world_center(shapes, circle, R, p),
+        (nx, ny, 0.0),
+        best,
+        feature,
+        margin,
+        buffer,
+        count,
+    )
 
 
-# Contacts of two convex polygons: separating axes, clipping, and closest corners if they are separated.
+# Contacts of two convex polygons: separating axes, clipping, and closest corners if they are
+# separated.
 #
-# The axis of largest separation s picks a reference edge; the other polygon's most opposed edge is clipped to
-# the strip over it, which leaves at most two points. Overlapping polygons always have the deepest vertex inside
-# that strip: the point of a Minkowski difference's boundary nearest to an interior point lies within an edge.
-# Separated polygons may be closest at two corners instead; then the contact is this pair of points.
+# The axis of largest separation s picks a reference edge; the other polygon's most opposed edge is
+# clipped to the strip over it, which leaves at most two points. Overlapping polygons always have
+# the deepest vertex inside that strip: the point of a Minkowski difference's boundary nearest to an
+# interior point lies within an edge. Separated polygons may be closest at two corners instead; then
+# the contact is this pair of points.
 
-# If the lowest point over the reference edge lies above the separation s by more than this share of the size of the
-# numbers it was computed from, the polygons are closest elsewhere. Two dozen operations round to below 1e-14, and
-# 1e-12 of the shapes' size is far below the accuracy of any geometry.
+# If the lowest point over the reference edge lies above the separation s by more than this share of
+# the size of the numbers it was computed from, the polygons are closest elsewhere. Two dozen
+# operations round to below 1e-14, and 1e-12 of the shapes' size is far below the accuracy of any
+# geometry.
 ROUNDING_SHARE = 1e-12
 
 
 @kernel(needs="polygons", otherwise=-1)
 def polygons(shapes, a, b, R, p, margin, buffer, count):
-    """Write the contacts (two at most) of convex polygons a and b; comments above describe the method."""
+    """Write the contacts (two at most) of convex polygons a and b; comments above describe the
+    method."""
     separation_a, edge_a = best_edge(shapes, a, b, R, p, margin)
     if separation_a > margin:
         return count
@@ -138,20 +175,29 @@ def polygons(shapes, a, b, R, p, margin, buffer, count):
     if separation_b > margin:
         return count
     if separation_b >= separation_a:
-        return _against_reference(shapes, b, a, edge_b, separation_b, True, R, p, margin, buffer, count)
-    return _against_reference(shapes, a, b, edge_a, separation_a, False, R, p, margin, buffer, count)
+        return _against_reference(
+            shapes, b, a, edge_b, separation_b, True, R, p, margin, buffer, count
+        )
+    return _against_reference(
+        shapes, a, b, edge_a, separation_a, False, R, p, margin, buffer, count
+    )
 
 
 @kernel
 def best_edge(shapes, onto, other, R, p, margin):
-    """Return the largest separation over the edge normals of `onto`, and its edge; return early above the margin.
+    """Return the largest separation over the edge normals of `onto`, and its edge; return early
+    above the margin.
 
-    separation of an edge = min over the vertices w of `other` of n·(w - v), n its outward normal, v its start
+    separation of an edge = min over the vertices w of `other` of n·(w - v), n its outward normal, v
+    its start
     """
     frame, best, edge = relative_frame(shapes, onto, other, R, p), -math.inf, 0
     for i in range(shapes.count[onto]):
         ux, uy, nx, ny, _ = edge_frame(shapes, onto, i)
-        mx, my = frame[0] * nx + frame[2] * ny, frame[1] * nx + frame[3] * ny  # the normal in the other's frame
+        mx, my = (
+            frame[0] * nx + frame[2] * ny,
+            frame[1] * nx + frame[3] * ny,
+        )  # the normal in the other's frame
         lowest = math.inf
         for k in range(shapes.count[other]):
             x, y = corner(shapes, other, k)
@@ -166,8 +212,12 @@ def best_edge(shapes, onto, other, R, p, margin):
 
 @kernel
 def edge_frame(shapes, shape, edge):
-    """Return start (x, y), outward unit normal (x, y) and length of an edge, in the polygon's frame."""
-    (ux, uy), (wx, wy) = corner(shapes, shape, edge), corner(shapes, shape, following(shapes, shape, edge))
+    """Return start (x, y), outward unit normal (x, y) and length of an edge, in the polygon's
+    frame."""
+    (ux, uy), (wx, wy) = (
+        corner(shapes, shape, edge),
+        corner(shapes, shape, following(shapes, shape, edge)),
+    )
     ex, ey = wx - ux, wy - uy
     length = math.sqrt(ex * ex + ey * ey)
     return ux, uy, ey / length, -ex / length, length
@@ -175,11 +225,14 @@ def edge_frame(shapes, shape, edge):
 
 @kernel
 def _against_reference(shapes, ref, other, edge, separation, ref_is_b, R, p, margin, buffer, count):
-    """Write the contacts over the reference edge, or between two corners if the polygons are closest there."""
+    """Write the contacts over the reference edge, or between two corners if the polygons are
+    closest there."""
     xx, xy, yx, yy, tx, ty = relative_frame(shapes, ref, other, R, p)
     ux, uy, nx, ny, length = edge_frame(shapes, ref, edge)
     mx, my, incident, opposed = xx * nx + yx * ny, xy * nx + yy * ny, 0, math.inf
-    for i in range(shapes.count[other]):  # the incident edge: its outward normal is most opposed to this one's
+    for i in range(
+        shapes.count[other]
+    ):  # the incident edge: its outward normal is most opposed to this one's
         _, _, ox, oy, _ = edge_frame(shapes, other, i)
         if ox * mx + oy * my < opposed:
             incident, opposed = i, ox * mx + oy * my
@@ -199,21 +252,30 @@ def _against_reference(shapes, ref, other, edge, separation, ref_is_b, R, p, mar
         start_s, start_h = (s0, separation) if h0 < h1 else (s1, separation)
         end_h = math.inf
 
-    side, opposite = (0, 1) if ref_is_b else (1, 0)  # vertex of the incident or of the reference edge
+    side, opposite = (
+        (0, 1) if ref_is_b else (1, 0)
+    )  # vertex of the incident or of the reference edge
     for s, h, vertex, end, cut in (
         (start_s, start_h, incident, following(shapes, ref, edge), s0 > length),
         (end_s, end_h, next_incident, edge, s1 < 0.0),
     ):
         if h <= margin:
-            feature = vertex_feature(opposite, end, incident) if cut else vertex_feature(side, vertex, edge)
+            feature = (
+                vertex_feature(opposite, end, incident)
+                if cut
+                else vertex_feature(side, vertex, edge)
+            )
             x, y = ux - ny * s + 0.5 * h * nx, uy + nx * s + 0.5 * h * ny
-            count = _store_from(shapes, ref, other, ref_is_b, feature, x, y, nx, ny, h, R, p, buffer, count)
+            count = _store_from(
+                shapes, ref, other, ref_is_b, feature, x, y, nx, ny, h, R, p, buffer, count
+            )
     return count
 
 
 @kernel
 def over_edge(shapes, other, vertex, from_start, nx, ny):
-    """Return the coordinates of a vertex over the reference edge: s along it from its start, h along its normal."""
+    """Return the coordinates of a vertex over the reference edge: s along it from its start, h
+    along its normal."""
     x, y = corner(shapes, other, vertex)
     x, y = place(from_start, x, y)
     return -ny * x + nx * y, nx * x + ny * y
@@ -232,15 +294,18 @@ def _store_from(shapes, ref, other, ref_is_b, feature, x, y, nx, ny, gap, R, p, 
     nx, ny = turn_to_world(nx, ny, body, R)
     if body >= 0:
         x, y = place(placement(body, R, p), x, y)
-    return store_contact(shapes, other, ref, ref_is_b, feature, (x, y, 0.0), (nx, ny, 0.0), gap, buffer, count)
+    return store_contact(
+        shapes, other, ref, ref_is_b, feature, (x, y, 0.0), (nx, ny, 0.0), gap, buffer, count
+    )
 
 
 @kernel
 def _corners(shapes, ref, other, ref_is_b, R, p, margin, buffer, count):
-    """Write one contact between the closest corners v of `ref` and w of `other`, two separated polygons.
+    """Write one contact between the closest corners v of `ref` and w of `other`, two separated
+    polygons.
 
-    Pairs of corners are enough: if a corner is closest to the inside of an edge, the best axis is the normal of this
-    edge and its separation is already the distance.
+    Pairs of corners are enough: if a corner is closest to the inside of an edge, the best axis is
+    the normal of this edge and its separation is already the distance.
     """
     frame, best, feature = relative_frame(shapes, ref, other, R, p), math.inf, 0
     vx, vy, wx, wy = 0.0, 0.0, 0.0, 0.0
@@ -256,5 +321,19 @@ def _corners(shapes, ref, other, ref_is_b, R, p, margin, buffer, count):
     distance = math.sqrt(best)
     if distance > margin:
         return count
-    return _store_from(shapes, ref, other, ref_is_b, feature, 0.5 * (vx + wx), 0.5 * (vy + wy), (wx - vx) / distance,
-                       (wy - vy) / distance, distance, R, p, buffer, count)
+    return _store_from(
+        shapes,
+        ref,
+        other,
+        ref_is_b,
+        feature,
+        0.5 * (vx + wx),
+        0.5 * (vy + wy),
+        (wx - vx) / distance,
+        (wy - vy) / distance,
+        distance,
+        R,
+        p,
+        buffer,
+        count,
+    )

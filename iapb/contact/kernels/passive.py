@@ -1,14 +1,17 @@
-"""Last step of every impact: prevent a gain of kinetic energy in real arithmetic; the enclosure that proves it.
+"""Last step of every impact: prevent a gain of kinetic energy in real arithmetic; the enclosure
+that proves it.
 
-Let s = w + v, Δ = w − v and A = M + Mᵀ, each an exact pair of doubles. Four times the gain of kinetic energy is
+Let s = w + v, Δ = w − v and A = M + Mᵀ, each an exact pair of doubles. Four times the gain of
+kinetic energy is
 
     Γ = Δᵀ A s = 2 (wᵀMw − vᵀMv)
 
-for the mass matrix M as given. A skew part of M cancels, and M is not replaced by a rounded symmetric part. (Δᵀ M s,
-without the transpose, differs from Γ/2 if M is asymmetric in the last bit.) A candidate w is accepted if an upper bound
-of Γ is not positive. Two functions bound Γ: `gain` in double-double, and `wide_gain` for numbers of any size. Coq
-proves both bounds for d ≤ 2¹⁵ (verification/proofs/coq). u = 2⁻⁵³ and η = 2⁻¹⁰⁷⁴. Operations round to nearest, without
-fastmath and without contraction.
+for the mass matrix M as given. A skew part of M cancels, and M is not replaced by a rounded
+symmetric part. (Δᵀ M s, without the transpose, differs from Γ/2 if M is asymmetric in the last
+bit.) A candidate w is accepted if an upper bound of Γ is not positive. Two functions bound Γ:
+`gain` in double-double, and `wide_gain` for numbers of any size. Coq proves both bounds for d ≤ 2¹⁵
+(verification/proofs/coq). u = 2⁻⁵³ and η = 2⁻¹⁰⁷⁴. Operations round to nearest, without fastmath
+and without contraction.
 """
 
 from __future__ import annotations
@@ -21,7 +24,9 @@ from iapb.compiled import copy_into, kernel
 from iapb.double_double import least_energy, two_product, two_sum
 
 UNIT = 2.0**-53
-_UNDERFLOW = 2.0**-1020  # 2⁵⁴ η: a normal number, since each operation with a subnormal one takes 0.1 µs
+_UNDERFLOW = (
+    2.0**-1020
+)  # 2⁵⁴ η: a normal number, since each operation with a subnormal one takes 0.1 µs
 _DROPPED = -800  # exponent relative to the largest term below which `wide_gain` omits a term
 _MOVES = 24  # of last places; four in ten candidates need none, most others one or two
 _GROWTH = 4.0  # of what is taken off a step, from one attempt to the next, should moves fail
@@ -29,13 +34,15 @@ _GROWTH = 4.0  # of what is taken off a step, from one attempt to the next, shou
 
 @kernel
 def gain(mass_matrix, v, w):
-    """Evaluate Γ in double-double: return (high, low, radius, underflow) with |Γ − (high + low)| ≤ radius + underflow.
+    """Evaluate Γ in double-double: return (high, low, radius, underflow) with |Γ − (high + low)| ≤
+    radius + underflow.
 
-    The pairs s, Δ and A are exact (TwoSum), products of high parts too (TwoProduct); `low` collects what both leave.
-    In units of u² S, S = Σᵢⱼ |dhᵢ ahᵢⱼ shⱼ|, the error is about 2d² + 17d + 26, and `radius` 2 (d+6)² = 2d² + 24d + 72.
-    Coq proves the bound for every d ≤ 2¹⁵, with the rounding of S, of `radius` and of the sum that callers form, and
-    `underflow` for products below 2⁻⁹⁶⁹. Overflow, also in Dekker's splitting, makes high + (low + radius) NaN or
-    infinite, which `gain_enclosure` refuses (verification/proofs/coq/Accepted.v, never_gains_in_binary64).
+    The pairs s, Δ and A are exact (TwoSum), products of high parts too (TwoProduct); `low` collects
+    what both leave. In units of u² S, S = Σᵢⱼ |dhᵢ ahᵢⱼ shⱼ|, the error is about 2d² + 17d + 26,
+    and `radius` 2 (d+6)² = 2d² + 24d + 72. Coq proves the bound for every d ≤ 2¹⁵, with the
+    rounding of S, of `radius` and of the sum that callers form, and `underflow` for products below
+    2⁻⁹⁶⁹. Overflow, also in Dekker's splitting, makes high + (low + radius) NaN or infinite, which
+    `gain_enclosure` refuses (verification/proofs/coq/Accepted.v, never_gains_in_binary64).
     """
     d = v.shape[0]
     high = low = size = moved = 0.0
@@ -64,16 +71,19 @@ def gain(mass_matrix, v, w):
 
 @kernel
 def wide_gain(mass_matrix, v, w):
-    """Return Γ for numbers of any size: (high, low, radius, exponent) with |Γ/2^exponent − (high + low)| ≤ radius.
+    """Return Γ for numbers of any size: (high, low, radius, exponent) with |Γ/2^exponent − (high +
+    low)| ≤ radius.
 
-    Γ = Σᵢⱼ Mᵢⱼ (Δᵢ sⱼ + sᵢ Δⱼ) has n = 8d² products x M y of doubles, x and y the halves of the pairs Δ and s. Each is
-    evaluated on mantissas in [½, 1), so that nothing under- or overflows, and scaled to the largest exponent among them
-    by a power of two. Products below 2⁻⁸⁰⁰ are omitted.
+    Γ = Σᵢⱼ Mᵢⱼ (Δᵢ sⱼ + sᵢ Δⱼ) has n = 8d² products x M y of doubles, x and y the halves of the
+    pairs Δ and s. Each is evaluated on mantissas in [½, 1), so that nothing under- or overflows,
+    and scaled to the largest exponent among them by a power of two. Products below 2⁻⁸⁰⁰ are
+    omitted.
 
-    Proof of the bound: with p + e = x M and q + f = p y exactly, the low part fl(f + fl(e y)) errs by 3u² of the
-    product; the sum is the compensated one of `gain`. With the rounding of S = Σ|q| and of low + radius this is below
-    (n + 5)² u² S; the omitted terms, at most n 2⁻⁸⁰⁰, are added. Coq proves it, and that no number overflows, if
-    frexp and ldexp are exact (verification/proofs/coq/Wide.v, wide_never_gains_in_binary64).
+    Proof of the bound: with p + e = x M and q + f = p y exactly, the low part fl(f + fl(e y)) errs
+    by 3u² of the product; the sum is the compensated one of `gain`. With the rounding of S = Σ|q|
+    and of low + radius this is below (n + 5)² u² S; the omitted terms, at most n 2⁻⁸⁰⁰, are added.
+    Coq proves it, and that no number overflows, if frexp and ldexp are exact
+    (verification/proofs/coq/Wide.v, wide_never_gains_in_binary64).
     """
     d, top, count = v.shape[0], -100_000, 0
     high = low = size = 0.0
@@ -110,7 +120,8 @@ def wide_gain(mass_matrix, v, w):
 def _half(v, w, difference, is_low):
     """Return mantissa and exponent of the high or the low half of w − v or of w + v.
 
-    The sum of quarters cannot overflow, and they are exact; where one of the two is below 2⁹⁰⁰, neither can w ± v.
+    The sum of quarters cannot overflow, and they are exact; where one of the two is below 2⁹⁰⁰,
+    neither can w ± v.
     """
     scale, shift = (0.25, 2) if min(abs(v), abs(w)) > 2.0**900 else (1.0, 0)
     high, low = two_sum(scale * w, -scale * v if difference else scale * v)
@@ -120,10 +131,11 @@ def _half(v, w, difference, is_low):
 
 @kernel
 def gain_enclosure(mass_matrix, v, w):
-    """Return (lower, upper, exponent): Γ lies in [lower, upper] · 2^exponent, up to one rounding of each end.
+    """Return (lower, upper, exponent): Γ lies in [lower, upper] · 2^exponent, up to one rounding of
+    each end.
 
-    If upper ≤ 0, then Γ ≤ 0 is certain: the last sum rounds once and keeps its sign. An infinite one can be wrong: the
-    halves of a product near 2¹⁰²⁴ can overflow where it does not.
+    If upper ≤ 0, then Γ ≤ 0 is certain: the last sum rounds once and keeps its sign. An infinite
+    one can be wrong: the halves of a product near 2¹⁰²⁴ can overflow where it does not.
     """
     high, low, radius, underflow = gain(mass_matrix, v, w)
     radius += underflow
@@ -136,9 +148,12 @@ def gain_enclosure(mass_matrix, v, w):
 
 @kernel
 def gain_signs(masses, v, w, signs):
-    """Write −1 (no gain), 1 (a gain) or 0 (undecided by the bound) for each of n steps; `masses`: n, or one for all."""
+    """Write −1 (no gain), 1 (a gain) or 0 (undecided by the bound) for each of n steps; `masses`:
+    n, or one for all."""
     for k in range(v.shape[0]):
-        lower, upper, _ = gain_enclosure(masses[k] if masses.shape[0] > 1 else masses[0], v[k], w[k])
+        lower, upper, _ = gain_enclosure(
+            masses[k] if masses.shape[0] > 1 else masses[0], v[k], w[k]
+        )
         signs[k] = -1 if upper <= 0.0 else (1 if lower > 0.0 else 0)
 
 
@@ -151,11 +166,12 @@ def write_step(v, change, factor, w):
 
 @kernel
 def passive_step(mass_matrix, v, change, alpha, w):
-    """Write w with no more energy than v in real arithmetic, and return β ≤ α: w is v + β change up to last places.
+    """Write w with no more energy than v in real arithmetic, and return β ≤ α: w is v + β change up
+    to last places.
 
-    If v + α change gains energy by its rounding, single entries of it are moved by last places (`_moved`); β = α. If
-    that fails, β decreases in growing steps towards −x/y, x = vᵀM change, y = changeᵀM change, where the loss is
-    largest. If no β > 0 is found, w = v and β = 0.
+    If v + α change gains energy by its rounding, single entries of it are moved by last places
+    (`_moved`); β = α. If that fails, β decreases in growing steps towards −x/y, x = vᵀM change, y =
+    changeᵀM change, where the loss is largest. If no β > 0 is found, w = v and β = 0.
     """
     if _moved(mass_matrix, v, change, alpha, w):
         return alpha
@@ -174,11 +190,12 @@ def passive_step(mass_matrix, v, change, alpha, w):
 
 @kernel
 def _moved(mass_matrix, v, change, alpha, w):
-    """Write v + α change, with single entries moved against their momentum; return whether it gains no energy.
+    """Write v + α change, with single entries moved against their momentum; return whether it gains
+    no energy.
 
-    A move takes as many whole last places as lower the energy by the upper bound of its gain, of the entry for which
-    this is the shortest way in the kinetic metric, √Mᵢᵢ |δ|: restitution changes least. Entries that the impact does
-    not change stay.
+    A move takes as many whole last places as lower the energy by the upper bound of its gain, of
+    the entry for which this is the shortest way in the kinetic metric, √Mᵢᵢ |δ|: restitution
+    changes least. Entries that the impact does not change stay.
     """
     write_step(v, change, alpha, w)
     for _ in range(_MOVES):
@@ -194,9 +211,17 @@ def _moved(mass_matrix, v, change, alpha, w):
             square = slope * slope - 2.0 * mass * wanted
             if change[i] == 0.0 or slope == 0.0 or not square >= 0.0:
                 continue
-            length = place * max(np.ceil(2.0 * wanted / (abs(slope) + math.sqrt(square)) / place), 1.0)
-            if (abs(slope) - 0.5 * mass * length) * length >= wanted and math.sqrt(mass) * length < shortest:
-                moved, to, shortest = i, w[i] - math.copysign(length, slope), math.sqrt(mass) * length
+            length = place * max(
+                np.ceil(2.0 * wanted / (abs(slope) + math.sqrt(square)) / place), 1.0
+            )
+            if (abs(slope) - 0.5 * mass * length) * length >= wanted and math.sqrt(
+                mass
+            ) * length < shortest:
+                moved, to, shortest = (
+                    i,
+                    w[i] - math.copysign(length, slope),
+                    math.sqrt(mass) * length,
+                )
         if moved < 0:
             return False
         w[moved] = to

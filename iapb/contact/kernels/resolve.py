@@ -1,8 +1,8 @@
 """Whole impacts in one call: scale by powers of two, resolve, scale back, bound the energy.
 
-Scaling every coordinate to a unit diagonal of M, every row to a largest entry near one and the velocity to a largest
-entry near one is exact in binary arithmetic. So no intermediate result over- or underflows, and a change of units or
-of row scale by a power of two changes no bit of the result.
+Scaling every coordinate to a unit diagonal of M, every row to a largest entry near one and the
+velocity to a largest entry near one is exact in binary arithmetic. So no intermediate result over-
+or underflows, and a change of units or of row scale by a power of two changes no bit of the result.
 """
 
 from __future__ import annotations
@@ -22,14 +22,17 @@ from iapb.double_double import kinetic_energies
 from iapb.linalg import add_multiple, all_finite, cholesky, dot_of
 from iapb.schema import Floats, Integers
 
-# |M − Mᵀ| up to this share of √(Mᵢᵢ Mⱼⱼ) counts as rounding of the given M. Energies use M as given, in which the skew
-# part cancels; the Cholesky factor is that of the symmetric part.
+# |M − Mᵀ| up to this share of √(Mᵢᵢ Mⱼⱼ) counts as rounding of the given M. Energies use M as
+# given, in which the skew part cancels; the Cholesky factor is that of the symmetric part.
 SYMMETRY_TOLERANCE = 1e-9
 LARGEST_ENTRY = 2.0  # of the scaled M: |Mᵢⱼ| < √(Mᵢᵢ Mⱼⱼ) holds where M is positive definite
 _LOWEST_EXPONENT = -100_000  # exponent given to zeros, so that they never decide a maximum
-_EXACT = 1000  # largest difference of binary exponents from the largest entry that still scales exactly
-# Where a contact still closes faster than this share of the largest |J v⁻|, or the energy clamp takes more than this,
-# the two LCPs of Poisson's law were not solved. Rounding leaves 1e-13 √κ(M); rows that push against each other more.
+_EXACT = (
+    1000  # largest difference of binary exponents from the largest entry that still scales exactly
+)
+# Where a contact still closes faster than this share of the largest |J v⁻|, or the energy clamp
+# takes more than this, the two LCPs of Poisson's law were not solved. Rounding leaves 1e-13 √κ(M);
+# rows that push against each other more.
 _UNSOLVED = 1e-6
 
 # How an impact ends; the last two have no result.
@@ -43,7 +46,9 @@ class Results(NamedTuple):
     generalized_impulse: np.ndarray  # (n, d)
     impulses: np.ndarray  # (n, c)
     tangential: np.ndarray  # (n, c m)
-    numbers: np.ndarray  # (n, 7) rank, status, energy change, its lower and its upper bound, clamp, share of friction
+    numbers: (
+        np.ndarray
+    )  # (n, 7) rank, status, energy change, its lower and its upper bound, clamp, share of friction
 
 
 class ResolveWork(NamedTuple):
@@ -51,7 +56,9 @@ class ResolveWork(NamedTuple):
 
     coordinate_exponent: Annotated[Integers, "velocity"]  # s
     row_exponent: Annotated[Integers, "row"]  # r
-    size: Annotated[Floats, "row"]  # ratio of the caller's rows to the scaled rows, up to one common factor
+    size: Annotated[
+        Floats, "row"
+    ]  # ratio of the caller's rows to the scaled rows, up to one common factor
     length: Annotated[Floats, "row"]
     impact: ImpactWork  # scaled
     push: PushWork
@@ -59,20 +66,41 @@ class ResolveWork(NamedTuple):
 
 
 @kernel
-def resolve_each(masses, jacobians, velocities, restitution, unequal, tangents, friction, tolerance, budget, clamped,
-                 work, out):
-    """Resolve n impacts in the caller's units; return the number of the first without a result, n if there is none.
+def resolve_each(
+    masses,
+    jacobians,
+    velocities,
+    restitution,
+    unequal,
+    tangents,
+    friction,
+    tolerance,
+    budget,
+    clamped,
+    work,
+    out,
+):
+    """Resolve n impacts in the caller's units; return the number of the first without a result, n
+    if there is none.
 
-    unequal : (n, c) restitution of each contact, by Poisson's law; None: `restitution` (n,), by (21) in factored form.
+    unequal : (n, c) restitution of each contact, by Poisson's law; None: `restitution` (n,), by
+        (21) in factored form.
     tangents (n, c m, d), friction (n, c) : Coulomb's friction, added to (21), or None.
     tolerance : rank tolerance of the rows; 0 selects the default.  out : `Results`
     """
     n, c, d = jacobians.shape
     impact, f = work.impact, work.friction
     for m in range(n):
-        v_plus, momentum, p, p_t = out.velocity[m], out.generalized_impulse[m], out.impulses[m], out.tangential[m]
+        v_plus, momentum, p, p_t = (
+            out.velocity[m],
+            out.generalized_impulse[m],
+            out.impulses[m],
+            out.tangential[m],
+        )
         out.numbers[m, 1] = REFUSED
-        sound, k, rounded = scale_impact(masses[m], jacobians[m], velocities[m], tangents is None, work)
+        sound, k, rounded = scale_impact(
+            masses[m], jacobians[m], velocities[m], tangents is None, work
+        )
         if not sound:
             return m
         whiten_impact(d, c, impact)
@@ -99,26 +127,42 @@ def resolve_each(masses, jacobians, velocities, restitution, unequal, tangents, 
                 clamp *= factor
                 status = COMPLETE if met else REDUCED
                 copy_into(p_t, f.p)
-        clamp *= unscale_impact(masses[m], velocities[m], clamped, k, work, v_plus, momentum, p, p_t, out.numbers[m])
-        if not (all_finite(v_plus) and all_finite(momentum) and all_finite(p) and all_finite(p_t)
-                and math.isfinite(out.numbers[m, 2])):
+        clamp *= unscale_impact(
+            masses[m], velocities[m], clamped, k, work, v_plus, momentum, p, p_t, out.numbers[m]
+        )
+        if not (
+            all_finite(v_plus)
+            and all_finite(momentum)
+            and all_finite(p)
+            and all_finite(p_t)
+            and math.isfinite(out.numbers[m, 2])
+        ):
             return m
         if unequal is not None and not separates(jacobians[m], velocities[m], v_plus):
             status = NOT_SOLVED
-        out.numbers[m, 0], out.numbers[m, 1] = rank, CANCELLED if clamp == 0.0 or rounded and c > 0 else status
+        out.numbers[m, 0], out.numbers[m, 1] = (
+            rank,
+            CANCELLED if clamp == 0.0 or rounded and c > 0 else status,
+        )
         out.numbers[m, 5], out.numbers[m, 6] = clamp, share
     return n
 
 
 @kernel
 def scale_impact(mass_matrix, jacobian, velocity, scales_rows, work):
-    """Scale: v' = 2^−(s + k) v, M' = 2^(s + s) M, J' = 2^(s + r) J, with r = 0 if rows are not to be scaled; factor M'.
+    """Scale: v' = 2^−(s + k) v, M' = 2^(s + s) M, J' = 2^(s + r) J, with r = 0 if rows are not to
+    be scaled; factor M'.
 
-    Returns whether all is finite and M symmetric and positive definite, k, and whether scaling rounded entries of v.
+    Returns whether all is finite and M symmetric and positive definite, k, and whether scaling
+    rounded entries of v.
     """
     d, s, r, impact = velocity.shape[0], work.coordinate_exponent, work.row_exponent, work.impact
     for i in range(d):
-        if not (mass_matrix[i, i] > 0.0 and math.isfinite(mass_matrix[i, i]) and math.isfinite(velocity[i])):
+        if not (
+            mass_matrix[i, i] > 0.0
+            and math.isfinite(mass_matrix[i, i])
+            and math.isfinite(velocity[i])
+        ):
             return False, 0, False
         s[i] = -(math.frexp(mass_matrix[i, i])[1] // 2)
     for i in range(d):
@@ -159,19 +203,24 @@ def _exponent(value):
 
 @kernel
 def separates(jacobian, v, v_plus):
-    """Whether no contact closes after Poisson's law, by more than _UNSOLVED of the largest contact velocity before."""
+    """Whether no contact closes after Poisson's law, by more than _UNSOLVED of the largest contact
+    velocity before."""
     largest, least = 0.0, 0.0
     for i in range(jacobian.shape[0]):
-        largest, least = max(largest, abs(dot_of(jacobian[i], v))), min(least, dot_of(jacobian[i], v_plus))
+        largest, least = (
+            max(largest, abs(dot_of(jacobian[i], v))),
+            min(least, dot_of(jacobian[i], v_plus)),
+        )
     return least >= -_UNSOLVED * largest
 
 
 @kernel
 def least_norm_impulses(d, count, rank, work, impulses):
-    """Write the p of least norm along the *caller's* rows with Aᵀp = Δu, as p' = 2^−r p for the scaled rows.
+    """Write the p of least norm along the *caller's* rows with Aᵀp = Δu, as p' = 2^−r p for the
+    scaled rows.
 
-    If row sizes differ, the p of least norm is computed first. Its rounding leaves a residual of Δu, which a p' of
-    least norm then corrects; this second solve does not depend on the row sizes.
+    If row sizes differ, the p of least norm is computed first. Its rounding leaves a residual of
+    Δu, which a p' of least norm then corrects; this second solve does not depend on the row sizes.
     """
     impact, r, least, even = work.impact, work.row_exponent, -_LOWEST_EXPONENT, True
     for i in range(count):
@@ -195,10 +244,14 @@ def least_norm_impulses(d, count, rank, work, impulses):
 
 
 @kernel
-def unscale_impact(mass_matrix, velocity, clamped, k, work, v_plus, momentum, impulses, tangential, numbers):
-    """Return to the caller's units in place; clamp the step again if this rounding raised the energy.
+def unscale_impact(
+    mass_matrix, velocity, clamped, k, work, v_plus, momentum, impulses, tangential, numbers
+):
+    """Return to the caller's units in place; clamp the step again if this rounding raised the
+    energy.
 
-    Writes the energy change, its lower and upper bound, unless v⁺ overflows; returns the factor of this clamp.
+    Writes the energy change, its lower and upper bound, unless v⁺ overflows; returns the factor of
+    this clamp.
     """
     d, s, factor, impact = velocity.shape[0], work.coordinate_exponent, 1.0, work.impact
     for i in range(d):
@@ -231,7 +284,8 @@ def unscale_impact(mass_matrix, velocity, clamped, k, work, v_plus, momentum, im
 
 @kernel
 def _outward(value, exponent, towards):
-    """Return value · 2^exponent, rounded one step outwards; a bound that shows no gain (or no loss) still shows it."""
+    """Return value · 2^exponent, rounded one step outwards; a bound that shows no gain (or no loss)
+    still shows it."""
     bound = np.nextafter(np.ldexp(value, exponent), towards)
     if towards > 0.0:
         return min(bound, 0.0) if value <= 0.0 else bound

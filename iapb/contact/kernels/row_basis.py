@@ -1,6 +1,8 @@
-"""The factored impact map u⁺ = u − (1 + e) Q Qᵀ u: equation (21) without a Delassus matrix; impulses of least norm.
+"""The factored impact map u⁺ = u − (1 + e) Q Qᵀ u: equation (21) without a Delassus matrix;
+impulses of least norm.
 
-Arrays hold one contact per *column*: `columns[:, i]` is row i of A = J L⁻ᵀ. `work` is an `ImpactWork`.
+Arrays hold one contact per *column*: `columns[:, i]` is row i of A = J L⁻ᵀ. `work` is an
+`ImpactWork`.
 """
 
 from __future__ import annotations
@@ -10,17 +12,22 @@ import math
 from iapb.compiled import kernel
 from iapb.linalg import add_multiple, dot_of, orthogonalize
 
-# A pivot is a residual row of at least this share of the longest one. A short residual has the rounding ε / ‖r‖ in its
-# direction. If only one direction is left, all rows tie, and without this rule rounding would choose the pivot.
+# A pivot is a residual row of at least this share of the longest one. A short residual has the
+# rounding ε / ‖r‖ in its direction. If only one direction is left, all rows tie, and without this
+# rule rounding would choose the pivot.
 _PIVOT_SHARE = 0.1
-_PASSES = 4  # each pass corrects the error of the one before; a vector that no pass leaves long enough is rounding
-# If orthogonalization leaves less than this share of a direction, it is rounding: no row can push along it.
+# each pass corrects the error of the one before; a vector that no pass leaves long enough is
+# rounding
+_PASSES = 4
+# If orthogonalization leaves less than this share of a direction, it is rounding: no row can push
+# along it.
 _NOISE = 1e-15
 
 
 @kernel
 def _most_violating(closing, size, count, eligible_above):
-    """Return the pivot: the eligible, long enough residual row with the largest |rᵢ·u| / ‖rᵢ‖; −1 if none."""
+    """Return the pivot: the eligible, long enough residual row with the largest |rᵢ·u| / ‖rᵢ‖; −1
+    if none."""
     best, best_speed, longest = -1, -1.0, 0.0
     for i in range(count):
         longest = max(longest, size[i])
@@ -35,7 +42,8 @@ def _most_violating(closing, size, count, eligible_above):
 
 @kernel
 def _next_direction(columns, pivot, basis, rank):
-    """Append the pivot's residual row, made orthonormal to the basis; return False if only its rounding is left."""
+    """Append the pivot's residual row, made orthonormal to the basis; return False if only its
+    rounding is left."""
     q = basis[rank, : columns.shape[0]]
     for k in range(q.shape[0]):
         q[k] = columns[k, pivot]
@@ -47,7 +55,9 @@ def _next_direction(columns, pivot, basis, rank):
         if left > 0.0:
             for k in range(q.shape[0]):
                 q[k] /= left
-        if turn > 0 and left > 0.5:  # orthogonal to rounding (Kahan, in Parlett 1980), nearly always in the first pass
+        if (
+            turn > 0 and left > 0.5
+        ):  # orthogonal to rounding (Kahan, in Parlett 1980), nearly always in the first pass
             return True
     return False
 
@@ -56,11 +66,18 @@ def _next_direction(columns, pivot, basis, rank):
 def orthonormal_basis(d, count, tolerance, budget, work):
     """Write an orthonormal basis of A's row space, most violated rows first; return its size.
 
-    work.columns : unit-scaled rows of A as columns; overwritten by their residuals.  work.u : whitened velocity Lᵀ v.
-    A residual row is eligible only above `tolerance` × its unit row. At most `budget` rows are used; every truncation
-    is passive. Rows 0 … rank − 1 of work.basis are the result.
+    work.columns : unit-scaled rows of A as columns; overwritten by their residuals.  work.u :
+        whitened velocity Lᵀ v.
+    A residual row is eligible only above `tolerance` × its unit row. At most `budget` rows are
+    used; every truncation is passive. Rows 0 … rank − 1 of work.basis are the result.
     """
-    columns, u, closing, size, overlap = work.columns[:d], work.u[:d], work.closing, work.size, work.overlap
+    columns, u, closing, size, overlap = (
+        work.columns[:d],
+        work.u[:d],
+        work.closing,
+        work.size,
+        work.overlap,
+    )
     closing[:count] = 0.0
     size[:count] = 0.0
     for k in range(d):
@@ -96,8 +113,9 @@ def orthonormal_basis(d, count, tolerance, budget, work):
 def minimum_norm_impulses(d, count, rank, length, change, impulses, work):
     """Write the p of least Euclidean norm with Aᵀ p = Δu, for Δu in the span of the basis.
 
-    With B = A Qᵀ (c × r, full column rank) the condition reads Bᵀ p = Q Δu; B = V T by twice-applied
-    Gram-Schmidt gives p = V T⁻ᵀ Q Δu. The unit rows of A in work.rows are taken times `length` (≥c,).
+    With B = A Qᵀ (c × r, full column rank) the condition reads Bᵀ p = Q Δu; B = V T by
+    twice-applied Gram-Schmidt gives p = V T⁻ᵀ Q Δu. The unit rows of A in work.rows are taken times
+    `length` (≥c,).
     """
     minimum_norm_factors(d, count, rank, length, work)
     for j in range(rank):
@@ -108,7 +126,8 @@ def minimum_norm_impulses(d, count, rank, length, change, impulses, work):
 
 @kernel
 def minimum_norm_factors(d, count, rank, length, work):
-    """Factor B = V T: write Vᵀ to work.columns, T to work.triangle; a direction that no row reaches becomes zero."""
+    """Factor B = V T: write Vᵀ to work.columns, T to work.triangle; a direction that no row reaches
+    becomes zero."""
     tall, triangle = work.columns, work.triangle
     for j in range(rank):
         for i in range(count):
@@ -128,7 +147,8 @@ def minimum_norm_factors(d, count, rank, length, work):
 
 @kernel
 def add_minimum_norm(count, rank, target, impulses, work):
-    """Add V T⁻ᵀ target to impulses, the least-norm change that adds `target` (rank,) to Bᵀ p; overwrite `target`."""
+    """Add V T⁻ᵀ target to impulses, the least-norm change that adds `target` (rank,) to Bᵀ p;
+    overwrite `target`."""
     for j in range(rank):
         total = target[j]
         for m in range(j):

@@ -10,22 +10,25 @@ import math
 from iapb.compiled import kernel
 from iapb.linalg import add, cross, dot, load, scale, store, subtract
 
-# An entry n·j of a row (j: motion of the point per unit rate of one dof) is set to exact zero at and below this
-# share of the numbers it was computed from. Kinematics round by about 2e-16 per joint, so n and j are known to
-# 1e-13 for chains of some hundred joints. A true deviation of 1e-13 rad from orthogonal cannot be distinguished
-# from this rounding, and no geometry is that accurate. Without the rule, the resolver's scaling of rows to unit
-# length would make a contact of a row of such entries.
+# An entry n·j of a row (j: motion of the point per unit rate of one dof) is set to exact zero at
+# and below this share of the numbers it was computed from. Kinematics round by about 2e-16 per
+# joint, so n and j are known to 1e-13 for chains of some hundred joints. A true deviation of 1e-13
+# rad from orthogonal cannot be distinguished from this rounding, and no geometry is that accurate.
+# Without the rule, the resolver's scaling of rows to unit length would make a contact of a row of
+# such entries.
 ROW_NOISE = 1e-13
 
 
 @kernel
 def add_body_row(m, w, body, x, n, factor, out, shift=0):
-    """out[shift + k] += factor · nᵀJ of the body at the world point x, k < d; the static world (-1) adds nothing.
+    """out[shift + k] += factor · nᵀJ of the body at the world point x, k < d; the static world (-1)
+    adds nothing.
 
-    With j the motion of x per unit rate of a dof, the entry n·j is left out if it is only rounding. For a translation
-    the bound is |n·j| <= ROW_NOISE ‖j‖. For a rotation j = a × (x − o), and the lever x − o has the rounding of x and
-    o, so the bound includes the size of x and o. For a contact at the joint itself the lever is only rounding.
-    Dofs that carry both bodies of a self-collision add and subtract the same number, which gives an exact zero.
+    With j the motion of x per unit rate of a dof, the entry n·j is left out if it is only rounding.
+    For a translation the bound is |n·j| <= ROW_NOISE ‖j‖. For a rotation j = a × (x − o), and the
+    lever x − o has the rounding of x and o, so the bound includes the size of x and o. For a
+    contact at the joint itself the lever is only rounding. Dofs that carry both bodies of a
+    self-collision add and subtract the same number, which gives an exact zero.
     """
     if body < 0:
         return
@@ -51,7 +54,8 @@ def body_row(m, w, body, contacts, i, out):
 
 @kernel
 def direction_row(m, w, contacts, i, direction, out):
-    """out (d,) <- row of the relative velocity at contact i along a unit direction; the normal's is (11) and (12)."""
+    """out (d,) <- row of the relative velocity at contact i along a unit direction; the normal's is
+    (11) and (12)."""
     out[:] = 0.0
     x = load(contacts.point, i)
     add_body_row(m, w, contacts.body_a[i], x, direction, 1.0, out)
@@ -60,7 +64,8 @@ def direction_row(m, w, contacts, i, direction, out):
 
 @kernel
 def write_pair_row(world, state, trees, i, direction, out):
-    """Write the row along a direction at contact i to out (2 w,): w entries for each of its two trees (−1 = none)."""
+    """Write the row along a direction at contact i to out (2 w,): w entries for each of its two
+    trees (−1 = none)."""
     half, x, factor = out.shape[0] // 2, load(state.contacts.point, i), 1.0
     out[:] = 0.0
     for body in (state.contacts.body_a[i], state.contacts.body_b[i]):
@@ -74,12 +79,15 @@ def write_pair_row(world, state, trees, i, direction, out):
 @kernel
 def friction_of(world, contacts, i):
     """Return μ of contact i, given by the friction classes of its two shapes."""
-    return world.friction[world.friction_class[contacts.shape_a[i]], world.friction_class[contacts.shape_b[i]]]
+    return world.friction[
+        world.friction_class[contacts.shape_a[i]], world.friction_class[contacts.shape_b[i]]
+    ]
 
 
 @kernel
 def tangent_of(n, which, tangents):
-    """Return unit tangent number `which` of a unit normal: of one tangent, in the plane z = 0, or of two."""
+    """Return unit tangent number `which` of a unit normal: of one tangent, in the plane z = 0, or
+    of two."""
     if tangents == 1:
         return (-n[1], n[0], 0.0)
     ax, ay, az = abs(n[0]), abs(n[1]), abs(n[2])
@@ -95,7 +103,8 @@ def tangent_of(n, which, tangents):
 
 @kernel
 def twist(m, w, body, v):
-    """Return the origin p of a body, the velocity u of p and the angular velocity ω; zeros for the static world.
+    """Return the origin p of a body, the velocity u of p and the angular velocity ω; zeros for the
+    static world.
 
     A point x fixed to the body moves with u + ω × (x − p).
     """
@@ -116,7 +125,8 @@ def twist(m, w, body, v):
 
 @kernel
 def contact_velocities(m, w, v, contacts, count):
-    """Write normal_velocity n·(v_a − v_b) and tangential_velocity (the rest of v_a − v_b) of each contact."""
+    """Write normal_velocity n·(v_a − v_b) and tangential_velocity (the rest of v_a − v_b) of each
+    contact."""
     points, normals, tangentials = contacts.point, contacts.normal, contacts.tangential_velocity
     a = b = -1  # bodies whose twists are computed already: contacts of one pair follow each other
     p_a, u_a, omega_a = p_b, u_b, omega_b = twist(m, w, -1, v)

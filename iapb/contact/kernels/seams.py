@@ -1,7 +1,7 @@
 """Seams: contacts that a rigid body would not have, since only its sag reaches them.
 
-A body that slides from one flush wall to the next overlaps the second one by its sag. The narrow phase then finds the
-side or the corner of this wall, and an impact there would stop the body.
+A body that slides from one flush wall to the next overlaps the second one by its sag. The narrow
+phase then finds the side or the corner of this wall, and an impact there would stop the body.
 """
 
 from __future__ import annotations
@@ -12,19 +12,25 @@ from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.shape_frames import copy_contact
 from iapb.linalg import add, dot, load, scale, store
 
-_OVERLAPS = 1e-9  # [m] what must be left without the sag; above the rounding of positions, below a sag that matters
-_LARGEST_SAG = 5e-5  # [m] well above the sag at the chosen stiffness; a deeper body has sunk into the next one, too
+# [m] what must be left without the sag; above the rounding of positions, below a sag that matters
+_OVERLAPS = 1e-9
+# [m] well above the sag at the chosen stiffness; a deeper body has sunk into the next one, too
+_LARGEST_SAG = 5e-5
 _SAME_NORMAL = 1.0 - 5e-7  # cosine of 1e-3 rad: such a contact carries the body, too
 
 
 @kernel(needs="supports", otherwise=0)
 def leave_out_seams(world, state, count):
-    """Drop new contacts of pairs that the sag of a resting contact explains; return how many contacts stay."""
+    """Drop new contacts of pairs that the sag of a resting contact explains; return how many
+    contacts stay."""
     contacts, kept, i = state.contacts, 0, 0
     while i < count:
         stop, strikes, old = i, False, False
-        while (stop < count and contacts.shape_a[stop] == contacts.shape_a[i]
-                and contacts.shape_b[stop] == contacts.shape_b[i]):
+        while (
+            stop < count
+            and contacts.shape_a[stop] == contacts.shape_a[i]
+            and contacts.shape_b[stop] == contacts.shape_b[i]
+        ):
             strikes = strikes or contacts.normal_velocity[stop] < -world.approach_velocity
             old = old or not contacts.is_new[stop]
             stop += 1
@@ -42,15 +48,19 @@ def leave_out_seams(world, state, count):
 
 @kernel
 def explained(world, state, i, count):
-    """Whether the pair of contact i does not overlap once one of its bodies is lifted out of a resting contact."""
+    """Whether the pair of contact i does not overlap once one of its bodies is lifted out of a
+    resting contact."""
     contacts, n = state.contacts, load(state.contacts.normal, i)
     for j in range(count):
         normal, sag, old = load(contacts.normal, j), 0.0, False
         if is_stop(contacts, j) or dot(n, normal) > _SAME_NORMAL:
             continue
         for k in range(count):  # of this surface: the deepest contact, and whether one lasts
-            if (contacts.body_a[k] == contacts.body_a[j] and contacts.body_b[k] == contacts.body_b[j]
-                    and dot(load(contacts.normal, k), normal) > _SAME_NORMAL):
+            if (
+                contacts.body_a[k] == contacts.body_a[j]
+                and contacts.body_b[k] == contacts.body_b[j]
+                and dot(load(contacts.normal, k), normal) > _SAME_NORMAL
+            ):
                 sag, old = max(sag, -contacts.gap[k]), old or not contacts.is_new[k]
         if not old or sag > _LARGEST_SAG:
             continue
@@ -70,6 +80,15 @@ def is_apart(world, state, a, b):
     """Whether a pair of shapes does not overlap."""
     for k in range(world.pairs.shape[0]):
         if world.pairs[k, 0] == a and world.pairs[k, 1] == b:
-            return detect(world.shapes, world.pairs[k : k + 1], state.body.rotation, state.body.position, -_OVERLAPS,
-                          state.scratch_contacts) == 0
+            return (
+                detect(
+                    world.shapes,
+                    world.pairs[k : k + 1],
+                    state.body.rotation,
+                    state.body.position,
+                    -_OVERLAPS,
+                    state.scratch_contacts,
+                )
+                == 0
+            )
     return False

@@ -1,4 +1,5 @@
-"""What the narrow phases of plane and space share: placements of shapes, feature numbers, balls, storing a contact."""
+"""What the narrow phases of plane and space share: placements of shapes, feature numbers, balls,
+storing a contact."""
 
 from __future__ import annotations
 
@@ -14,7 +15,8 @@ from iapb.linalg import add, column, dot, load, scale, store, subtract, transfor
 def vertex_feature(kind, vertex, edge):
     """Return the number of a feature: its kind, and vertex and edge with 20 bits each.
 
-    kind 0: vertex of a, edge of b; 1: vertex of b, edge of a; 2: two corners; 3 to 5: faces and edges of boxes
+    kind 0: vertex of a, edge of b; 1: vertex of b, edge of a; 2: two corners; 3 to 5: faces and
+    edges of boxes
     """
     return (kind << 40) | (vertex << 20) | edge
 
@@ -33,8 +35,14 @@ def relative_frame(shapes, onto, other, R, p):
     ixx, ixy, iyx, iyy, ix, iy = placement(shapes.body[onto], R, p)
     jxx, jxy, jyx, jyy, jx, jy = placement(shapes.body[other], R, p)
     dx, dy = jx - ix, jy - iy
-    return (ixx * jxx + iyx * jyx, ixx * jxy + iyx * jyy, ixy * jxx + iyy * jyx, ixy * jxy + iyy * jyy,
-            ixx * dx + iyx * dy, ixy * dx + iyy * dy)
+    return (
+        ixx * jxx + iyx * jyx,
+        ixx * jxy + iyx * jyy,
+        ixy * jxx + iyy * jyx,
+        ixy * jxy + iyy * jyy,
+        ixx * dx + iyx * dy,
+        ixy * dx + iyy * dy,
+    )
 
 
 @kernel
@@ -68,14 +76,19 @@ def world_axis(shapes, shape, k, R):
 @kernel
 def world_axes(shapes, shape, R):
     """Return the three axes of a shape in the world."""
-    return world_axis(shapes, shape, 0, R), world_axis(shapes, shape, 1, R), world_axis(shapes, shape, 2, R)
+    return (
+        world_axis(shapes, shape, 0, R),
+        world_axis(shapes, shape, 1, R),
+        world_axis(shapes, shape, 2, R),
+    )
 
 
 @kernel(needs="balls", otherwise=-1)
 def balls(shapes, a, b, R, p, margin, buffer, count):
     """Write the contact of two circles or two spheres: gap = distance of centres - both radii.
 
-    Coincident centres have no line for the normal. It is then along the last axis, antisymmetric in the two shapes.
+    Coincident centres have no line for the normal. It is then along the last axis, antisymmetric in
+    the two shapes.
     """
     center = world_center(shapes, b, R, p)
     apart = subtract(world_center(shapes, a, R, p), center)
@@ -95,8 +108,11 @@ def balls(shapes, a, b, R, p, margin, buffer, count):
 
 
 @kernel
-def ball_on_surface(shapes, ball, other, ball_is_a, center, normal, distance, feature, margin, buffer, count):
-    """Write the contact of a circle or sphere with the surface at a signed distance from its centre."""
+def ball_on_surface(
+    shapes, ball, other, ball_is_a, center, normal, distance, feature, margin, buffer, count
+):
+    """Write the contact of a circle or sphere with the surface at a signed distance from its
+    centre."""
     gap = distance - shapes.radius[ball]
     if gap > margin:
         return count
@@ -106,14 +122,19 @@ def ball_on_surface(shapes, ball, other, ball_is_a, center, normal, distance, fe
 
 @kernel
 def store_contact(shapes, one, other, one_is_a, feature, point, normal, gap, buffer, count):
-    """Write a contact at row `count`, its normal given out of shape `other`; return the next row, or -1: no room."""
+    """Write a contact at row `count`, its normal given out of shape `other`; return the next row,
+    or -1: no room."""
     if not 0 <= count < buffer.gap.shape[0]:
         return -1
     a, b = (one, other) if one_is_a else (other, one)
     if not one_is_a:
         normal = (-normal[0], -normal[1], -normal[2] if shapes.kind[a] >= HALF_SPACE else 0.0)
     buffer.shape_a[count], buffer.shape_b[count], buffer.feature[count] = a, b, feature
-    buffer.body_a[count], buffer.body_b[count], buffer.gap[count] = shapes.body[a], shapes.body[b], gap
+    buffer.body_a[count], buffer.body_b[count], buffer.gap[count] = (
+        shapes.body[a],
+        shapes.body[b],
+        gap,
+    )
     store(buffer.point, count, point)
     store(buffer.normal, count, normal)
     return count + 1
@@ -122,7 +143,11 @@ def store_contact(shapes, one, other, one_is_a, feature, point, normal, gap, buf
 @kernel
 def copy_contact(to, i, contacts, j):
     """Copy the geometry of contact j to row i of the buffer `to`."""
-    to.shape_a[i], to.shape_b[i], to.feature[i] = contacts.shape_a[j], contacts.shape_b[j], contacts.feature[j]
+    to.shape_a[i], to.shape_b[i], to.feature[i] = (
+        contacts.shape_a[j],
+        contacts.shape_b[j],
+        contacts.feature[j],
+    )
     to.body_a[i], to.body_b[i], to.gap[i] = contacts.body_a[j], contacts.body_b[j], contacts.gap[j]
     store(to.point, i, load(contacts.point, j))
     store(to.normal, i, load(contacts.normal, j))

@@ -1,7 +1,8 @@
 """Contacts of spatial shapes: spheres, half-spaces and boxes.
 
-Conventions are those of the plane: the normal points from b into a, gap < 0 is overlap, the point lies midway between
-the surfaces, and a contact is kept if gap <= margin. Every normal has unit length, also where centres coincide.
+Conventions are those of the plane: the normal points from b into a, gap < 0 is overlap, the point
+lies midway between the surfaces, and a contact is kept if gap <= margin. Every normal has unit
+length, also where centres coincide.
 """
 
 from __future__ import annotations
@@ -36,11 +37,20 @@ def spatial_pair(shapes, a, b, R, p, margin, buffer, count):
 
 @kernel
 def corners_half_space(shapes, a, b, R, p, margin, buffer, count):
-    """Write one contact per corner of box a, or one for sphere a: gap = (corner - point)·normal - radius."""
-    normal, center, radius = world_axis(shapes, b, 2, R), world_center(shapes, a, R, p), shapes.radius[a]
+    """Write one contact per corner of box a, or one for sphere a: gap = (corner - point)·normal -
+    radius."""
+    normal, center, radius = (
+        world_axis(shapes, b, 2, R),
+        world_center(shapes, a, R, p),
+        shapes.radius[a],
+    )
     height = dot(subtract(center, world_center(shapes, b, R, p)), normal)
     x, y, z = world_axes(shapes, a, R)
-    x, y, z = (scale(shapes.half_size[a, 0], x), scale(shapes.half_size[a, 1], y), scale(shapes.half_size[a, 2], z))
+    x, y, z = (
+        scale(shapes.half_size[a, 0], x),
+        scale(shapes.half_size[a, 1], y),
+        scale(shapes.half_size[a, 2], z),
+    )
     over_x, over_y, over_z = dot(x, normal), dot(y, normal), dot(z, normal)
     for corner in range(8 if shapes.kind[a] == BOX else 1):
         sx, sy, sz = 1.0 - 2.0 * (corner & 1), 1.0 - (corner & 2), 1.0 - 0.5 * (corner & 4)
@@ -48,13 +58,16 @@ def corners_half_space(shapes, a, b, R, p, margin, buffer, count):
         if gap <= margin:
             arm = add(scale(sx, x), add(scale(sy, y), scale(sz, z)))
             point = subtract(add(center, arm), scale(radius + 0.5 * gap, normal))
-            count = store_contact(shapes, a, b, True, vertex_feature(0, corner, 0), point, normal, gap, buffer, count)
+            count = store_contact(
+                shapes, a, b, True, vertex_feature(0, corner, 0), point, normal, gap, buffer, count
+            )
     return count
 
 
 @kernel
 def sphere_box(shapes, sphere, box, sphere_is_a, R, p, margin, buffer, count):
-    """Write the contact of a sphere and a box, at the box's nearest point, or nearest face for a centre inside."""
+    """Write the contact of a sphere and a box, at the box's nearest point, or nearest face for a
+    centre inside."""
     center = world_center(shapes, sphere, R, p)
     apart, half = subtract(center, world_center(shapes, box, R, p)), load(shapes.half_size, box)
     reach = half[0] + half[1] + half[2] + shapes.radius[sphere] + margin
@@ -77,38 +90,56 @@ def sphere_box(shapes, sphere, box, sphere_is_a, R, p, margin, buffer, count):
         distance, region, normal = -exit_distance, exit_region, exit_normal
     else:
         normal = (outward[0] / distance, outward[1] / distance, outward[2] / distance)
-    return ball_on_surface(shapes, sphere, box, sphere_is_a, center, normal, distance, vertex_feature(1, region, 0),
-                           margin, buffer, count)
+    return ball_on_surface(
+        shapes,
+        sphere,
+        box,
+        sphere_is_a,
+        center,
+        normal,
+        distance,
+        vertex_feature(1, region, 0),
+        margin,
+        buffer,
+        count,
+    )
 
 
 # Contacts of two boxes: separating axes (15), then faces against each other or edge against edge.
 #
-# The axis of largest separation decides. A face of one box (the reference) meets the most opposed face of the other
-# (incident). Seen along the normal they are a rectangle and a parallelogram. Their intersection has three kinds of
-# corners: incident corners in the rectangle, reference corners in the parallelogram, crossings of edges. Of more than
-# four points four are kept, so that the stiffness under a face does not depend on the orientation of the faces. Source:
-# Gottschalk, Lin and Manocha, SIGGRAPH 1996 (the 15 axes).
+# The axis of largest separation decides. A face of one box (the reference) meets the most opposed
+# face of the other (incident). Seen along the normal they are a rectangle and a parallelogram.
+# Their intersection has three kinds of corners: incident corners in the rectangle, reference
+# corners in the parallelogram, crossings of edges. Of more than four points four are kept, so that
+# the stiffness under a face does not depend on the orientation of the faces. Source: Gottschalk,
+# Lin and Manocha, SIGGRAPH 1996 (the 15 axes).
 #
-# The gap of separated boxes is the largest separation over the axes: exact where a face or two edges face each other,
-# elsewhere a lower bound of the distance.
+# The gap of separated boxes is the largest separation over the axes: exact where a face or two
+# edges face each other, elsewhere a lower bound of the distance.
 
-# Two edges give no axis if the sine of their angle is below this. A face's axis is then as good to 1e-12 of the size,
-# and the normalized cross product would carry rounding of 1e-16 / 1e-6.
+# Two edges give no axis if the sine of their angle is below this. A face's axis is then as good to
+# 1e-12 of the size, and the normalized cross product would carry rounding of 1e-16 / 1e-6.
 PARALLEL_SINE = 1e-6
-# Two edges decide only if they overlap less than the faces by this share: a face that rests on a face with a small tilt
-# keeps its whole patch. The gap reported is then at most this share deeper than the true one.
+# Two edges decide only if they overlap less than the faces by this share: a face that rests on a
+# face with a small tilt keeps its whole patch. The gap reported is then at most this share deeper
+# than the true one.
 EDGE_SHARE = 0.05
 # They must also overlap less by this share of the boxes' size, the rounding of the separations.
 ROUNDING_SHARE = 1e-12
-# A face of b that is parallel to a's decides only if it overlaps less by this share of the boxes' size: two faces that
-# rest on each other keep one normal, and the same points, while the boxes settle.
+# A face of b that is parallel to a's decides only if it overlaps less by this share of the boxes'
+# size: two faces that rest on each other keep one normal, and the same points, while the boxes
+# settle.
 FACE_SHARE, FACES_COSINE = 1e-4, 0.9999
 
 
 @kernel
 def placed_box(shapes, shape, R, p):
     """Return centre, axes and half sizes of a box in the world."""
-    return world_center(shapes, shape, R, p), world_axes(shapes, shape, R), load(shapes.half_size, shape)
+    return (
+        world_center(shapes, shape, R, p),
+        world_axes(shapes, shape, R),
+        load(shapes.half_size, shape),
+    )
 
 
 @kernel
@@ -136,14 +167,20 @@ def boxes(shapes, a, b, R, p, margin, buffer, count):
 def _reach(box, n):
     """Return half the extent of a box along n."""
     _, axes, half = box
-    return half[0] * abs(dot(axes[0], n)) + half[1] * abs(dot(axes[1], n)) + half[2] * abs(dot(axes[2], n))
+    return (
+        half[0] * abs(dot(axes[0], n))
+        + half[1] * abs(dot(axes[1], n))
+        + half[2] * abs(dot(axes[2], n))
+    )
 
 
 @kernel
 def _best_face(apart, A, B, bias):
-    """Return the face axis that decides, whether it is a's, its separation, and the largest separation of all faces.
+    """Return the face axis that decides, whether it is a's, its separation, and the largest
+    separation of all faces.
 
-    Along a face of b that is parallel to a's, the separation must exceed that along a's by the bias [m].
+    Along a face of b that is parallel to a's, the separation must exceed that along a's by the bias
+    [m].
     """
     face, of_a, best = 0, True, -math.inf
     for k in range(3):
@@ -162,7 +199,8 @@ def _best_face(apart, A, B, bias):
 
 @kernel
 def _best_edges(apart, A, B):
-    """Return the edge directions i of a and j of b of largest separation on their common normal, and the separation."""
+    """Return the edge directions i of a and j of b of largest separation on their common normal,
+    and the separation."""
     best_i, best_j, best = 0, 0, -math.inf
     for i in range(3):
         for j in range(3):
@@ -179,7 +217,8 @@ def _best_edges(apart, A, B):
 
 @kernel
 def _edge_middle(box, k, n):
-    """Return the middle of the edge along axis k that lies farthest in direction n, and its feature number."""
+    """Return the middle of the edge along axis k that lies farthest in direction n, and its feature
+    number."""
     (point, axes, half), number = box, 0
     for other in range(3):
         if other != k:
@@ -199,7 +238,8 @@ def _edges(shapes, a, b, i, j, gap, A, B, buffer, count):
         n = scale(-1.0, n)
     x, edge_a = _edge_middle(A, i, scale(-1.0, n))
     y, edge_b = _edge_middle(B, j, n)
-    # closest points x + s a_i, y + t b_j of two lines: (x - y + s a_i - t b_j) is orthogonal to a_i and b_j
+    # closest points x + s a_i, y + t b_j of two lines: (x - y + s a_i - t b_j) is orthogonal to a_i
+    # and b_j
     cosine, between = dot(along, across), subtract(x, y)
     along_a, along_b = dot(between, along), dot(between, across)
     sine_square = 1.0 - cosine * cosine
@@ -207,17 +247,24 @@ def _edges(shapes, a, b, i, j, gap, A, B, buffer, count):
     t = (along_b - cosine * along_a) / sine_square
     s, t = min(max(s, -A[2][i]), A[2][i]), min(max(t, -B[2][j]), B[2][j])
     point = scale(0.5, add(add(x, scale(s, along)), add(y, scale(t, across))))
-    return store_contact(shapes, a, b, True, vertex_feature(5, edge_a, edge_b), point, n, gap, buffer, count)
+    return store_contact(
+        shapes, a, b, True, vertex_feature(5, edge_a, edge_b), point, n, gap, buffer, count
+    )
 
 
-# Face against face of two boxes: the corners of their overlap as contacts. In the frame of the reference face (x, y
-# along its sides, h the height over it) the incident face is c + α e1 + β e2 with α, β in [-1, 1].
-ALIGNED = 1e-9  # of the faces' sizes: points closer than this are one corner; far above rounding, far below any sag
+# Face against face of two boxes: the corners of their overlap as contacts. In the frame of the
+# reference face (x, y along its sides, h the height over it) the incident face is c + α e1 + β e2
+# with α, β in [-1, 1].
+# of the faces' sizes: points closer than this are one corner; far above rounding, far below any sag
+ALIGNED = 1e-9
 
 
 @kernel
-def clip_faces(shapes, ref, other, ref_is_a, face, separation, box, box_other, margin, buffer, count):
-    """Write the contacts over the reference face `face` of box `ref`; its outward normal m points to the other box."""
+def clip_faces(
+    shapes, ref, other, ref_is_a, face, separation, box, box_other, margin, buffer, count
+):
+    """Write the contacts over the reference face `face` of box `ref`; its outward normal m points
+    to the other box."""
     (center, axes, half), (center_other, axes_other, half_other) = box, box_other
     apart = subtract(center_other, center)
     sign = 1.0 if dot(apart, axes[face]) >= 0.0 else -1.0
@@ -232,22 +279,46 @@ def clip_faces(shapes, ref, other, ref_is_a, face, separation, box, box_other, m
     middle = add(apart, scale(side * half_other[incident], axes_other[incident]))
     first, second = scale(half_other[k1], axes_other[k1]), scale(half_other[k2], axes_other[k2])
     c = (dot(middle, u), dot(middle, v), dot(middle, m) - half[face])
-    e1, e2 = (dot(first, u), dot(first, v), dot(first, m)), (dot(second, u), dot(second, v), dot(second, m))
+    e1, e2 = (
+        (dot(first, u), dot(first, v), dot(first, m)),
+        (dot(second, u), dot(second, v), dot(second, m)),
+    )
     faces = (2 * face + (1 if sign > 0.0 else 0)) * 6 + 2 * incident + (1 if side > 0.0 else 0)
-    origin, kind, start, deepest = add(center, scale(half[face], m)), 3 if ref_is_a else 4, count, (0.0, 0.0, 1e300)
+    origin, kind, start, deepest = (
+        add(center, scale(half[face], m)),
+        3 if ref_is_a else 4,
+        count,
+        (0.0, 0.0, 1e300),
+    )
     near = ALIGNED * (sides[0] + sides[1] + _extent(e1) + _extent(e2))
     for number in range(25):
         inside, corner = _corner_of_overlap(number, c, e1, e2, sides, near)
         if number < 4 and corner[2] < deepest[2]:
             deepest = corner
-        if number == 24:  # no overlap seen along the normal, or rounding at a corner: take the deepest corner
+        if (
+            number == 24
+        ):  # no overlap seen along the normal, or rounding at a corner: take the deepest corner
             inside, x, y = count == start, deepest[0], deepest[1]
-            corner = (min(max(x, -sides[0]), sides[0]), min(max(y, -sides[1]), sides[1]), separation)
+            corner = (
+                min(max(x, -sides[0]), sides[0]),
+                min(max(y, -sides[1]), sides[1]),
+                separation,
+            )
         x, y, h = corner
         if inside and h <= margin:
             point = add(add(origin, scale(0.5 * h, m)), add(scale(x, u), scale(y, v)))
-            count = store_contact(shapes, other, ref, not ref_is_a, vertex_feature(kind, faces, number), point, m, h,
-                                  buffer, count)
+            count = store_contact(
+                shapes,
+                other,
+                ref,
+                not ref_is_a,
+                vertex_feature(kind, faces, number),
+                point,
+                m,
+                h,
+                buffer,
+                count,
+            )
     return keep_widest(buffer, start, count, m) if count - start > BOX_PAIR_CONTACTS else count
 
 
@@ -255,14 +326,17 @@ def clip_faces(shapes, ref, other, ref_is_a, face, separation, box, box_other, m
 def _corner_of_overlap(number, c, e1, e2, sides, near):
     """Return whether candidate `number` is a corner of the overlap, and its (x, y, h).
 
-    0-3 incident corners in the rectangle, 4-7 reference corners in the parallelogram, 8-23 crossings of two edges. What
-    lies within a multiple of `near` [m] of a border, as rounding has it where edges are aligned, is a corner once:
-    an incident one if it can be, else a reference one. Faces that coincide thus give four points.
+    0-3 incident corners in the rectangle, 4-7 reference corners in the parallelogram, 8-23
+    crossings of two edges. What lies within a multiple of `near` [m] of a border, as rounding has
+    it where edges are aligned, is a corner once: an incident one if it can be, else a reference
+    one. Faces that coincide thus give four points.
     """
     first, second = 1.0 - 2.0 * (number & 1), 1.0 - (number & 2)
     if number < 4:
         corner = add(add(c, scale(first, e1)), scale(second, e2))
-        return abs(corner[0]) <= sides[0] + 4.0 * near and abs(corner[1]) <= sides[1] + 4.0 * near, corner
+        return abs(corner[0]) <= sides[0] + 4.0 * near and abs(corner[1]) <= sides[
+            1
+        ] + 4.0 * near, corner
     if number < 8:
         x, y = first * sides[0], second * sides[1]
         area = e1[0] * e2[1] - e1[1] * e2[0]
@@ -294,8 +368,8 @@ def _extent(e):
 def keep_widest(buffer, start, count, m):
     """Keep four of the contacts from row `start` on; return the new count.
 
-    They are the deepest, the one farthest from it, and the two that span the largest triangles with both, one on each
-    side.
+    They are the deepest, the one farthest from it, and the two that span the largest triangles with
+    both, one on each side.
     """
     if count == buffer.gap.shape[0]:
         return -1

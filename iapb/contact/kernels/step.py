@@ -1,15 +1,17 @@
 """One step of the paper's algorithm, compiled: one function per effect, behind one `if` each.
 
-`advance` is the whole contact law: contacts (III), collisions (V), resting forces (IV), integration by Δt.
-The Penalty law is the same algorithm with the impulses switched off (e = −1, claim C09).
+`advance` is the whole contact law: contacts (III), collisions (V), resting forces (IV), integration
+by Δt. The Penalty law is the same algorithm with the impulses switched off (e = −1, claim C09).
 
-Forces at the start of a step give the new velocity, and the bodies move with it. The scene's `integrator` says how:
+Forces at the start of a step give the new velocity, and the bodies move with it. The scene's
+`integrator` says how:
 
-- ``momentum``, the default, moves the bodies freely (`iapb.mechanics.kernels.free_motion`): linear and angular momentum
-  are kept to rounding in the world's axes. Trees without contact get half of gravity before and half after they move,
-  so they move with order 2 under gravity, and a free rigid body with order 4. With contact, or under forces of a hand
-  or device, the order is 1.
-- ``semi_implicit_euler``, the paper's, has order 1: Coriolis terms are forces at the start of the step.
+- ``momentum``, the default, moves the bodies freely (`iapb.mechanics.kernels.free_motion`): linear
+  and angular momentum are kept to rounding in the world's axes. Trees without contact get half of
+  gravity before and half after they move, so they move with order 2 under gravity, and a free rigid
+  body with order 4. With contact, or under forces of a hand or device, the order is 1.
+- ``semi_implicit_euler``, the paper's, has order 1: Coriolis terms are forces at the start of the
+  step.
 
 On quaternions and other groups q moves by integrate(q, v, dt), never by addition.
 """
@@ -55,8 +57,8 @@ from iapb.mechanics.kernels.free_motion import (
 from iapb.mechanics.kernels.kinematics import forward_kinematics
 from iapb.run import COLLIDING, FREE
 
-# Above this speed [m/s, rad/s] products of masses, stiffnesses, displacements and speeds may overflow: the motion has
-# diverged. (Scenes hold numbers up to 1e9.)
+# Above this speed [m/s, rad/s] products of masses, stiffnesses, displacements and speeds may
+# overflow: the motion has diverged. (Scenes hold numbers up to 1e9.)
 LARGEST_SPEED = 1e100
 
 OK, NOT_POSITIVE_DEFINITE, TOO_MANY_CONTACTS, NOT_FINITE = range(4)
@@ -85,7 +87,8 @@ def advance(world, state, applied):
 
 @kernel
 def contact_state(state, tool_tree):
-    """Return the state of the tool's group; without a tool: COLLIDING if any tree collides, RESTING if any rests."""
+    """Return the state of the tool's group; without a tool: COLLIDING if any tree collides, RESTING
+    if any rests."""
     found = FREE
     for t in range(state.state_of_tree.shape[0]):
         if tool_tree in (-1, t) and (found == FREE or state.state_of_tree[t] == COLLIDING):
@@ -95,7 +98,8 @@ def contact_state(state, tool_tree):
 
 @kernel
 def locate(world, state):
-    """Place all bodies at q; update M and its factor if they depend on q. Return False if M is not definite."""
+    """Place all bodies at q; update M and its factor if they depend on q. Return False if M is not
+    definite."""
     forward_kinematics(world.mechanism, state.q, state.body)
     stale = world.switches.varying_inertia
     if world.conserving and stale:
@@ -106,14 +110,19 @@ def locate(world, state):
     if not stale:
         return True
     mass_matrix(world.mechanism, state.body, state.mass_matrix)
-    return cholesky_tree_blocks(state.mass_matrix, world.tree_start, world.tree_stop, state.lower) == 0
+    return (
+        cholesky_tree_blocks(state.mass_matrix, world.tree_start, world.tree_stop, state.lower) == 0
+    )
 
 
 @kernel
 def find_contacts(world, state):
-    """Find the contacts (section III): cluster them, mark new ones, classify groups; return how many, -1: too many."""
+    """Find the contacts (section III): cluster them, mark new ones, classify groups; return how
+    many, -1: too many."""
     now, before = state.contacts, state.previous
-    for i in range(state.contact_count[0]):  # `mark_new` and friction compare with those of the last step
+    for i in range(
+        state.contact_count[0]
+    ):  # `mark_new` and friction compare with those of the last step
         copy_contact(before, i, now, i)
         before.normal_force[i], before.expected[i] = now.normal_force[i], now.expected[i]
     state.contact_count[1] = state.contact_count[0]
@@ -132,9 +141,12 @@ def find_contacts(world, state):
 
 @kernel
 def present_contacts(world, state, contacts):
-    """Find, cluster and complete the contacts of the present configuration; return how many, -1: too many."""
+    """Find, cluster and complete the contacts of the present configuration; return how many, -1:
+    too many."""
     R, p, pairs = state.body.rotation, state.body.position, world.pairs
-    margin = TOUCHING if world.implicit else 0.0  # all corners of a face that touches, whatever its rounding
+    margin = (
+        TOUCHING if world.implicit else 0.0
+    )  # all corners of a face that touches, whatever its rounding
     if world.broad_phase.used:
         near = near_pairs(world.broad_phase, R, p, margin)
         if near < 0:
@@ -172,7 +184,8 @@ def move(world, state, applied):
 
 @kernel
 def implicit_forces(world, state, touches):
-    """Apply joint damping and contact, from the state at the start of the step. Return False if M is not definite."""
+    """Apply joint damping and contact, from the state at the start of the step. Return False if M
+    is not definite."""
     damped = world.switches.joint_damping
     if damped and not damp_joints(world, state):
         return False
@@ -187,7 +200,8 @@ def implicit_forces(world, state, touches):
 
 @kernel
 def drift(world, state, applied):
-    """Move all trees freely for Δt, then apply the second half of gravity to falling trees. False: M not definite."""
+    """Move all trees freely for Δt, then apply the second half of gravity to falling trees. False:
+    M not definite."""
     m, free = world.mechanism, world.free
     if not (free.turning and world.switches.velocity_terms):
         integrate(m, state.q, state.v, world.dt, state.q)
@@ -213,19 +227,23 @@ def coriolis(world, state):
     bias(world.mechanism, state.body, state.v, state.bias)
     for k in range(state.v.shape[0]):
         state.acceleration[k] = -state.bias[k]
-    solve_tree_blocks(state.lower, world.tree_start, world.tree_stop, state.acceleration, state.acceleration)
+    solve_tree_blocks(
+        state.lower, world.tree_start, world.tree_stop, state.acceleration, state.acceleration
+    )
 
 
 @kernel(needs="linked", otherwise=True)
 def swing(world, state, h):
-    """Move the linkages by h [s]: velocity Verlet, then the root's momentum and the energy are those before."""
+    """Move the linkages by h [s]: velocity Verlet, then the root's momentum and the energy are
+    those before."""
     m, free, a = world.mechanism, world.free, state.acceleration
     for t in range(free.kind.shape[0]):
         if free.kind[t] == LINKAGE:
             start, stop = world.tree_start[t], world.tree_stop[t]
             p = state.root_momentum[t]
-            state.tree_energy[t] = base_momentum(m, free, state.body, state.q, state.mass_matrix, start, stop, t,
-                                                 state.v, p)
+            state.tree_energy[t] = base_momentum(
+                m, free, state.body, state.q, state.mass_matrix, start, stop, t, state.v, p
+            )
             center, mass = center_of(m, state.body, world.tree_of_body, t)
             path = scale(h / mass if mass > 0.0 else 0.0, linear_momentum(m, free, t, p))
             p[6], p[7], p[8] = add(center, path)
@@ -241,7 +259,15 @@ def swing(world, state, h):
         if free.base[t] > 0 and m.kind[free.root[t]] != SPHERICAL:
             p = state.root_momentum[t]
             center, _ = center_of(m, state.body, world.tree_of_body, t)
-            shift_root(m, free, state.body, world.tree_of_body, state.q, t, subtract((p[6], p[7], p[8]), center))
+            shift_root(
+                m,
+                free,
+                state.body,
+                world.tree_of_body,
+                state.q,
+                t,
+                subtract((p[6], p[7], p[8]), center),
+            )
     copy_into(state.located_q, state.q)
     copy_into(state.body.placed_q[: state.q.shape[0]], state.q)
     copy_into(state.acceleration_before, a)
@@ -253,16 +279,27 @@ def swing(world, state, h):
                 state.v[k] += 0.5 * h * (a[k] - state.acceleration_before[k])
             p = state.root_momentum[t]
             to_fixed_axes(m, free, state.body, state.q, t, p, -1.0)
-            keep_momentum_and_energy(state.mass_matrix, state.lower, start, stop, free.base[t], p,
-                                     state.tree_energy[t], state.v, state.bias)
+            keep_momentum_and_energy(
+                state.mass_matrix,
+                state.lower,
+                start,
+                stop,
+                free.base[t],
+                p,
+                state.tree_energy[t],
+                state.v,
+                state.bias,
+            )
     return True
 
 
 @kernel
 def falls(world, state, applied, t):
-    """Return whether tree t is free of contact and, with implicit contact, of the hand and the coupling.
+    """Return whether tree t is free of contact and, with implicit contact, of the hand and the
+    coupling.
 
-    Only where gravity acts alone is it split in halves: a force that holds a weight would move it by half a step.
+    Only where gravity acts alone is it split in halves: a force that holds a weight would move it
+    by half a step.
     """
     alone = state.state_of_tree[t] == FREE
     for k in range(world.tree_start[t], world.tree_stop[t] if world.implicit else 0):
@@ -272,7 +309,8 @@ def falls(world, state, applied, t):
 
 @kernel
 def pull_falling_trees(world, state, applied):
-    """Add half a step of gravity to the velocity of falling trees; the other half acted before they moved."""
+    """Add half a step of gravity to the velocity of falling trees; the other half acted before they
+    moved."""
     some = False
     for t in range(world.tree_start.shape[0]):
         some = some or falls(world, state, applied, t)
@@ -295,10 +333,11 @@ def add_to_falling_trees(world, state, applied, vector, factor):
 
 @kernel(needs="joint_damping", otherwise=True)
 def damp_joints(world, state):
-    """Solve (M + Δt D) v⁺ = M v for damped trees, D diagonal; −D v⁺ into `acceleration`. False: not definite.
+    """Solve (M + Δt D) v⁺ = M v for damped trees, D diagonal; −D v⁺ into `acceleration`. False: not
+    definite.
 
-    v⁺ minimizes ½|v⁺ − v|²_M + ½ Δt v⁺ᵀ D v⁺, so that ½|v⁺|²_M ≤ ½|v|²_M for every D ≥ 0 and every Δt: the step is
-    passive, and the loss is Δt v⁺ᵀ D v⁺ + ½|v⁺ − v|²_M.
+    v⁺ minimizes ½|v⁺ − v|²_M + ½ Δt v⁺ᵀ D v⁺, so that ½|v⁺|²_M ≤ ½|v|²_M for every D ≥ 0 and every
+    Δt: the step is passive, and the loss is Δt v⁺ᵀ D v⁺ + ½|v⁺ − v|²_M.
     """
     a, mass, lower = state.acceleration, state.work.mass, state.work.lower
     for t in range(world.tree_start.shape[0]):
@@ -326,14 +365,18 @@ def damp_joints(world, state):
 def accelerate(world, state, applied):
     """Solve (7), M a = applied + penalty + friction − B − G.
 
-    The forces (4)-(6) act at the contacts of groups that do not collide; in a collision the impulse acts.
+    The forces (4)-(6) act at the contacts of groups that do not collide; in a collision the impulse
+    acts.
     """
     a, contacts = state.acceleration, state.contacts
     if not world.implicit:
         for i in range(state.contact_count[0]):
             contacts.normal_force[i] = 0.0
             store(contacts.friction_force, i, (0.0, 0.0, 0.0))
-            if state.state_of_tree[group_of_contact(world, contacts, i, state.group_of_tree)] != COLLIDING:
+            if (
+                state.state_of_tree[group_of_contact(world, contacts, i, state.group_of_tree)]
+                != COLLIDING
+            ):
                 resting_force(world, state, contacts, i)
     for k in range(a.shape[0]):
         a[k] = applied[k] + state.penalty_force[k] + state.friction_force[k]

@@ -1,7 +1,9 @@
-"""Impulses that only push: min ½|b + Aᵀp|² over p ≥ 0, and Poisson's law for unequal restitution based on it.
+"""Impulses that only push: min ½|b + Aᵀp|² over p ≥ 0, and Poisson's law for unequal restitution
+based on it.
 
-The minimizer is the solution of the LCP `0 ≤ p ⟂ A(b + Aᵀp) ≥ 0`. The solver is the active-set method of Lawson and
-Hanson (Solving Least Squares Problems, 1974, chapter 23) on Gram-Schmidt factors.
+The minimizer is the solution of the LCP `0 ≤ p ⟂ A(b + Aᵀp) ≥ 0`. The solver is the active-set
+method of Lawson and Hanson (Solving Least Squares Problems, 1974, chapter 23) on Gram-Schmidt
+factors.
 """
 
 from __future__ import annotations
@@ -14,7 +16,8 @@ from iapb.contact.kernels.impact import apply_change
 from iapb.linalg import dot_of, from_whitened, orthogonalize
 from iapb.schema import Booleans, Floats, Integers
 
-# A row counts as closing if its speed exceeds this share of |b|, the rounding of a d-term sum of unit rows.
+# A row counts as closing if its speed exceeds this share of |b|, the rounding of a d-term sum of
+# unit rows.
 _CLOSING = 1e-13
 
 
@@ -32,9 +35,11 @@ class PushWork(NamedTuple):
 
 @kernel
 def push_only(rows, count, b, p, residual, work):
-    """Solve `0 ≤ p ⟂ A(b + Aᵀp) ≥ 0`; write p and residual = b + Aᵀp. Return False if it did not converge.
+    """Solve `0 ≤ p ⟂ A(b + Aᵀp) ≥ 0`; write p and residual = b + Aᵀp. Return False if it did not
+    converge.
 
-    rows : (d, ≥count) unit rows of A as columns; p : (≥count,); residual : (d,); work : a `PushWork`.
+    rows : (d, ≥count) unit rows of A as columns; p : (≥count,); residual : (d,); work : a
+        `PushWork`.
     """
     d, size, known = b.shape[0], 0, 0
     copy_into(residual, b)
@@ -69,7 +74,8 @@ def push_only(rows, count, b, p, residual, work):
 
 @kernel
 def _solve_passive(rows, b, known, size, work):
-    """Solve least squares on the passive rows, with `known` directions given; return how many are independent."""
+    """Solve least squares on the passive rows, with `known` directions given; return how many are
+    independent."""
     q, triangle, solution = work.q, work.triangle, work.solution
     for j in range(known, size):
         copy_into(q[j, : b.shape[0]], rows[:, work.passive[j]])
@@ -89,14 +95,16 @@ def _solve_passive(rows, b, known, size, work):
 
 @kernel
 def _retreat(rows, b, size, p, work):
-    """Move p towards the passive solution and release rows that would pull; return the number of passive rows, and
-    how many of their directions are known."""
+    """Move p towards the passive solution and release rows that would pull; return the number of
+    passive rows, and how many of their directions are known."""
     passive, solution = work.passive, work.solution
     while True:
         step, blocking = 1.0, -1
         for j in range(size):
             if solution[j] <= 0.0:
-                ratio = p[passive[j]] / (p[passive[j]] - solution[j]) if p[passive[j]] > 0.0 else 0.0
+                ratio = (
+                    p[passive[j]] / (p[passive[j]] - solution[j]) if p[passive[j]] > 0.0 else 0.0
+                )
                 if ratio < step or blocking < 0:
                     step, blocking = ratio, j
         for j in range(size):
@@ -115,15 +123,20 @@ def _retreat(rows, b, size, p, work):
 
 @kernel
 def poisson_impact(d, count, restitution, clamped, work, push, impulses):
-    """Resolve `count` rows, after `whiten_impact`, by Poisson's law with e in [0, 1] for each, by two LCPs.
+    """Resolve `count` rows, after `whiten_impact`, by Poisson's law with e in [0, 1] for each, by
+    two LCPs.
 
     Compression `0 ≤ p_c ⟂ A(u + Aᵀp_c) ≥ 0`, then restitution `0 ≤ p_e − E p_c ⟂ A u⁺ ≥ 0`,
-    p = p_c + p_e (docs/theory.md; Glocker and Pfeiffer 1995). Passive for every E in [0, 1] and any u.
-    Writes v⁺, the generalized impulse M(v⁺ − v⁻) and the impulses along the rows; returns (number of rows that
-    push, clamp). If the active-set method does not converge, it returns (−1, 1) and v⁺ is not written.
+    p = p_c + p_e (docs/theory.md; Glocker and Pfeiffer 1995). Passive for every E in [0, 1] and any
+    u. Writes v⁺, the generalized impulse M(v⁺ − v⁻) and the impulses along the rows; returns
+    (number of rows that push, clamp). If the active-set method does not converge, it returns (−1,
+    1) and v⁺ is not written.
     """
     rows, u = work.rows, work.u[:d]
-    compressed, final = work.target[:d], work.along[:d]  # whitened velocities after compression and after restitution
+    compressed, final = (
+        work.target[:d],
+        work.along[:d],
+    )  # whitened velocities after compression and after restitution
     if not push_only(rows, count, u, impulses, compressed, push):
         return -1, 1.0
     for i in range(count):

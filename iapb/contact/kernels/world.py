@@ -1,4 +1,5 @@
-"""Input of a step (World, constant) and its output (State): plain arrays and numbers for the kernels."""
+"""Input of a step (World, constant) and its output (State): plain arrays and numbers for the
+kernels."""
 
 from __future__ import annotations
 
@@ -29,7 +30,8 @@ class Switches(NamedTuple):
     impact_friction: bool
     friction: bool  # of resting contacts
     clustering: bool
-    supports: bool  # a contact that strikes may have others beside it, which carry a load or have another e
+    # a contact that strikes may have others beside it, which carry a load or have another e
+    supports: bool
     impulse_limit: bool
     spreading: bool
     contacts: bool
@@ -38,7 +40,8 @@ class Switches(NamedTuple):
 
 
 class Stops(NamedTuple):
-    """Ends of the joints' ranges, as contacts of a body and its parent (k of them; `iapb.scene.mechanism.stops_of`)."""
+    """Ends of the joints' ranges, as contacts of a body and its parent (k of them;
+    `iapb.scene.mechanism.stops_of`)."""
 
     body: np.ndarray  # (k,) int64
     parent: np.ndarray  # (k,) int64, −1 = the world
@@ -73,7 +76,9 @@ class World(NamedTuple):
     friction: np.ndarray  # (classes, classes) μ (6) of two shapes by their classes
     friction_velocity: float  # v_threshold [m/s] (6)
     restitution: float  # e of all contacts whose shapes give no e of their own
-    own_restitution: np.ndarray  # (shapes + stops,) e that a shape's body or wall gives, above 1 = none
+    own_restitution: (
+        np.ndarray
+    )  # (shapes + stops,) e that a shape's body or wall gives, above 1 = none
     approach_velocity: float  # v_approach [m/s]: slower approach is not a collision
     cluster_distance: float  # [m]
     coherence_distance: float  # [m]
@@ -86,7 +91,8 @@ class World(NamedTuple):
 
 
 class State(NamedTuple):
-    """Everything that changes from step to step, and the scratch of the step; `iapb.system` makes it from the fields.
+    """Everything that changes from step to step, and the scratch of the step; `iapb.system` makes
+    it from the fields.
 
     A row is one of an impact: of a contact, or of one of its two bodies (`per_body_rows`).
     """
@@ -124,6 +130,10 @@ class State(NamedTuple):
     friction_work: FrictionWork
     rest_work: RestWork
     located_q: Annotated[Floats, "coordinate"]  # configuration of mass_matrix and lower; NaN: any
-    root_momentum: Annotated[Floats, "tree 9"]  # scratch of free motion: a root's momentum and its centre
+    root_momentum: Annotated[
+        Floats, "tree 9"
+    ]  # scratch of free motion: a root's momentum and its centre
     tree_energy: Annotated[Floats, "tree"]  # of a tree, in free motion
-    impacts: Any  # of the step: `logged` (1,) lines in use, and (t,) lines of `iapb.run.ImpactTable`, without the step
+    # of the step: `logged` (1,) lines in use, and (t,) lines of `iapb.run.ImpactTable`, without the
+    # step
+    impacts: Any

@@ -1,4 +1,5 @@
-"""Input of the kernels (MechanismArrays, constant) and their scratch (Workspace, one per thread)."""
+"""Input of the kernels (MechanismArrays, constant) and their scratch (Workspace, one per
+thread)."""
 
 from __future__ import annotations
 
@@ -31,7 +32,8 @@ class MechanismArrays(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Scratch of the kernels for one mechanism, world axes. `forward_kinematics` fills the first four fields."""
+    """Scratch of the kernels for one mechanism, world axes. `forward_kinematics` fills the first
+    four fields."""
 
     rotation: Annotated[Floats, "body 3 3"]  # body axes as columns
     position: Annotated[Floats, "body 3"]  # [m] body origin
@@ -46,11 +48,14 @@ class Workspace(NamedTuple):
     linear_acceleration: Annotated[Floats, "body 3"]  # of the body origin, minus gravity
     force: Annotated[Floats, "body 3"]  # that the joint transmits to the body
     moment: Annotated[Floats, "body 3"]  # about the body origin
-    placed_q: Annotated[Floats, "placed"]  # first nq: the q of the first four fields; NaN: not computed yet
+    placed_q: Annotated[
+        Floats, "placed"
+    ]  # first nq: the q of the first four fields; NaN: not computed yet
 
 
 def make_workspace(bodies: int, dofs: int) -> Workspace:
-    """Return scratch for a mechanism with that many bodies and dofs (joints have at most two entries of q per dof)."""
+    """Return scratch for a mechanism with that many bodies and dofs (joints have at most two
+    entries of q per dof)."""
     made = zeros_of(Workspace, body=bodies, dof=dofs, placed=2 * dofs)
     made.placed_q[:] = np.nan
     return made

@@ -1,7 +1,8 @@
 """Steps on the configuration manifold: q (+) v dt and its inverse, joint by joint.
 
-Coordinates of vector joints are added. (cos, sin) pairs and quaternions turn by the group exponential and are
-normalized to length one. Velocities in body axes (free flyer) follow the screw motion of SE(3), as in Pinocchio.
+Coordinates of vector joints are added. (cos, sin) pairs and quaternions turn by the group
+exponential and are normalized to length one. Velocities in body axes (free flyer) follow the screw
+motion of SE(3), as in Pinocchio.
 """
 
 from math import sqrt
@@ -11,8 +12,8 @@ from iapb.elementary import arc_tangent, sine_cosine
 from iapb.linalg import add, cross, dot, scale
 from iapb.mechanics.joints import CONTINUOUS, FREE_FLYER, SPHERICAL
 
-# Below this angle [rad] the series of the screw coefficients (two terms kept) is exact to 1e-17, while the
-# closed forms lose digits: 1 - cos keeps eps / angle^2.
+# Below this angle [rad] the series of the screw coefficients (two terms kept) is exact to 1e-17,
+# while the closed forms lose digits: 1 - cos keeps eps / angle^2.
 SMALL_ANGLE = 1e-4
 
 
@@ -43,7 +44,8 @@ def turn_quaternion(q, i, phi, out):
 
 @kernel(needs="quaternions")
 def integrate_in_space(m, b, q, v, dt, out):
-    """Turn a spherical joint; a free flyer moves as p += R (1 + A [phi]x + B [phi]x^2) u, and R turns by phi.
+    """Turn a spherical joint; a free flyer moves as p += R (1 + A [phi]x + B [phi]x^2) u, and R
+    turns by phi.
 
     u = v_linear dt, phi = v_angular dt, t = |phi|, A = (1 - cos t) / t^2, B = (t - sin t) / t^3.
     """
@@ -75,7 +77,8 @@ def is_vector(kind):
 
 @kernel
 def integrate_body(m, b, q, v, dt, out):
-    """Coordinates of body b in out (nq,) <- those in q moved for dt with the constant velocity v."""
+    """Coordinates of body b in out (nq,) <- those in q moved for dt with the constant velocity
+    v."""
     kind, i, k = m.kind[b], m.q_start[b], m.v_start[b]
     if kind == CONTINUOUS:
         sin, cos = sine_cosine(v[k] * dt)
@@ -98,7 +101,8 @@ def integrate(m, q, v, dt, out):
 
 @kernel
 def quaternion_difference(q0, q1, i):
-    """Return the rotation vector phi, in the body axes of q0, with q1 = q0 * exp(phi / 2) and |phi| <= pi."""
+    """Return the rotation vector phi, in the body axes of q0, with q1 = q0 * exp(phi / 2) and |phi|
+    <= pi."""
     a, s = (-q0[i], -q0[i + 1], -q0[i + 2]), q0[i + 3]
     b, t = (q1[i], q1[i + 1], q1[i + 2]), q1[i + 3]
     vector = add(add(scale(s, b), scale(t, a)), cross(a, b))
@@ -114,7 +118,8 @@ def quaternion_difference(q0, q1, i):
 def difference_in_space(m, b, q0, q1, out):
     """Write the velocity of body b, which has a quaternion, from q0 to q1.
 
-    A free flyer's u solves (1 + A [phi]x + B [phi]x^2) u = path: u = path - phi x path / 2 + C phi x (phi x path).
+    A free flyer's u solves (1 + A [phi]x + B [phi]x^2) u = path: u = path - phi x path / 2 + C phi
+    x (phi x path).
     """
     i, k = m.q_start[b], m.v_start[b]
     if m.kind[b] == SPHERICAL:
@@ -142,7 +147,9 @@ def difference(m, q0, q1, out):
     for b in range(m.kind.shape[0]):
         kind, i, k = m.kind[b], m.q_start[b], m.v_start[b]
         if kind == CONTINUOUS:
-            out[k] = arc_tangent(q0[i] * q1[i + 1] - q0[i + 1] * q1[i], q0[i] * q1[i] + q0[i + 1] * q1[i + 1])
+            out[k] = arc_tangent(
+                q0[i] * q1[i + 1] - q0[i + 1] * q1[i], q0[i] * q1[i] + q0[i + 1] * q1[i + 1]
+            )
         elif kind in (SPHERICAL, FREE_FLYER):
             difference_in_space(m, b, q0, q1, out)
         else:

@@ -1,12 +1,24 @@
 """Equations of motion M dv/dt + B + G = tau (paper (1)) by composite bodies and by Newton-Euler.
 
-Sources: Walker and Orin 1982 (composite rigid bodies), Luh, Walker and Paul 1980 (Newton-Euler), both as in
-Featherstone, Rigid Body Dynamics Algorithms, 2008, here in world axes. Composite inertias are kept about the
-composite's own centre of mass, where merging two bodies only adds positive terms.
+Sources: Walker and Orin 1982 (composite rigid bodies), Luh, Walker and Paul 1980 (Newton-Euler),
+both as in Featherstone, Rigid Body Dynamics Algorithms, 2008, here in world axes. Composite
+inertias are kept about the composite's own centre of mass, where merging two bodies only adds
+positive terms.
 """
 
 from iapb.compiled import kernel
-from iapb.linalg import accumulate, add, cross, dot, load, scale, store, subtract, transform, transform_back
+from iapb.linalg import (
+    accumulate,
+    add,
+    cross,
+    dot,
+    load,
+    scale,
+    store,
+    subtract,
+    transform,
+    transform_back,
+)
 from iapb.mechanics.joints import FREE_FLYER
 
 
@@ -27,7 +39,11 @@ def composite_bodies(m, w):
         store(w.composite_center, b, load(w.center, b))
         rotation = w.rotation[b]  # the inertia in world axes is R I R^T
         x, y, z = load(rotation, 0), load(rotation, 1), load(rotation, 2)
-        image_x, image_y, image_z = transform(m.inertia, b, x), transform(m.inertia, b, y), transform(m.inertia, b, z)
+        image_x, image_y, image_z = (
+            transform(m.inertia, b, x),
+            transform(m.inertia, b, y),
+            transform(m.inertia, b, z),
+        )
         xx, yy, zz = dot(x, image_x), dot(y, image_y), dot(z, image_z)
         xy, xz, yz = dot(x, image_y), dot(x, image_z), dot(y, image_z)
         own = w.composite_inertia[b]
@@ -42,7 +58,12 @@ def composite_bodies(m, w):
             center = load(w.composite_center, into)
             r = subtract(load(w.composite_center, b), center)
             share = m2 / total if total > 0.0 else 0.0
-            mu, square, inertia, own = m1 * share, dot(r, r), w.composite_inertia[into], w.composite_inertia[b]
+            mu, square, inertia, own = (
+                m1 * share,
+                dot(r, r),
+                w.composite_inertia[into],
+                w.composite_inertia[b],
+            )
             xy, xz, yz = -mu * (r[0] * r[1]), -mu * (r[0] * r[2]), -mu * (r[1] * r[2])
             accumulate(inertia, 0, add(load(own, 0), (mu * (square - r[0] * r[0]), xy, xz)))
             accumulate(inertia, 1, add(load(own, 1), (xy, mu * (square - r[1] * r[1]), yz)))
@@ -55,8 +76,9 @@ def composite_bodies(m, w):
 def mass_matrix(m, w, out):
     """out (d, d) <- M(q), symmetric; entries of two dofs on different branches are zero.
 
-    Column j: a unit velocity of dof j gives its composite the linear momentum l and the angular momentum h
-    about the composite centre c; its entry with dof i before it is a_i . l or a_i . (h + (c - o_i) x l).
+    Column j: a unit velocity of dof j gives its composite the linear momentum l and the angular
+    momentum h about the composite centre c; its entry with dof i before it is a_i . l or a_i . (h +
+    (c - o_i) x l).
     """
     composite_bodies(m, w)
     out[:] = 0.0
@@ -83,16 +105,20 @@ def mass_matrix(m, w, out):
 
 @kernel
 def gravity(m, w, g, out):
-    """out (d,) <- G(q) = d(potential energy)/dq for the gravity field g (3,) [m/s^2], world axes."""
+    """out (d,) <- G(q) = d(potential energy)/dq for the gravity field g (3,) [m/s^2], world
+    axes."""
     for b in range(m.kind.shape[0]):
         store(w.force, b, scale(-m.mass[b], (g[0], g[1], g[2])))
-        store(w.moment, b, cross(subtract(load(w.center, b), load(w.position, b)), load(w.force, b)))
+        store(
+            w.moment, b, cross(subtract(load(w.center, b), load(w.position, b)), load(w.force, b))
+        )
     project_forces(m, w, out)
 
 
 @kernel
 def project_forces(m, w, out):
-    """Sum forces and moments (about body origins) from the leaves inwards; out (d,) <- their dof components."""
+    """Sum forces and moments (about body origins) from the leaves inwards; out (d,) <- their dof
+    components."""
     for b in range(m.kind.shape[0] - 1, -1, -1):
         f, n = load(w.force, b), load(w.moment, b)
         for k in range(m.v_start[b], m.v_start[b] + m.v_count[b]):
@@ -106,7 +132,8 @@ def project_forces(m, w, out):
 
 @kernel
 def relative_motion(m, w, b, rates):
-    """Return linear and angular part of the joint's motion, in world axes, for the given rates of its dofs."""
+    """Return linear and angular part of the joint's motion, in world axes, for the given rates of
+    its dofs."""
     linear, angular = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for k in range(m.v_start[b], m.v_start[b] + m.v_count[b]):
         if m.dof_rotates[k]:
@@ -134,19 +161,22 @@ def body_velocities(m, w, v):
 def inverse_dynamics(m, w, v, dv, g, out):
     """out (d,) <- tau = M dv + B(q, v) + G(q) by Newton-Euler; an empty dv counts as zero.
 
-    The world accelerates by -g, which includes the weight. With r = p_b - p_parent and the joint's motion
-    (u, s) for v, (u', s') for dv:
+    The world accelerates by -g, which includes the weight. With r = p_b - p_parent and the joint's
+    motion (u, s) for v, (u', s') for dv:
     alpha = alpha_p + omega_p x s + s',
     a = a_p + alpha_p x r + omega_p x (omega_p x r + 2 u) + u' [+ s x u, velocities in body axes].
-    Then, with r = c - p and the inertia I in body axes, f = m (a + alpha x r + omega x (omega x r)) and
-    n = R (I R^T alpha + R^T omega x I R^T omega) + r x f about p.
+    Then, with r = c - p and the inertia I in body axes, f = m (a + alpha x r + omega x (omega x r))
+    and n = R (I R^T alpha + R^T omega x I R^T omega) + r x f about p.
     """
     for b in range(m.kind.shape[0]):
         parent = m.parent[b]
         u, s = relative_motion(m, w, b, v)
         omega, alpha, a = s, (0.0, 0.0, 0.0), (0.0 - g[0], 0.0 - g[1], 0.0 - g[2])
         if parent >= 0:
-            carried, carried_alpha = load(w.angular_velocity, parent), load(w.angular_acceleration, parent)
+            carried, carried_alpha = (
+                load(w.angular_velocity, parent),
+                load(w.angular_acceleration, parent),
+            )
             r = subtract(load(w.position, b), load(w.position, parent))
             omega, alpha = add(carried, s), add(carried_alpha, cross(carried, s))
             a = add(load(w.linear_acceleration, parent), cross(carried_alpha, r))
@@ -161,7 +191,10 @@ def inverse_dynamics(m, w, v, dv, g, out):
         store(w.linear_acceleration, b, a)
         r = subtract(load(w.center, b), load(w.position, b))
         f = scale(m.mass[b], add(a, add(cross(alpha, r), cross(omega, cross(omega, r)))))
-        own_omega, own_alpha = transform_back(w.rotation, b, omega), transform_back(w.rotation, b, alpha)
+        own_omega, own_alpha = (
+            transform_back(w.rotation, b, omega),
+            transform_back(w.rotation, b, alpha),
+        )
         h = transform(m.inertia, b, own_omega)
         n = transform(w.rotation, b, add(transform(m.inertia, b, own_alpha), cross(own_omega, h)))
         store(w.force, b, f)
@@ -171,5 +204,6 @@ def inverse_dynamics(m, w, v, dv, g, out):
 
 @kernel
 def bias(m, w, v, out):
-    """out (d,) <- B(q, v): Coriolis and centripetal generalized forces, `inverse_dynamics` without dv/dt and weight."""
+    """out (d,) <- B(q, v): Coriolis and centripetal generalized forces, `inverse_dynamics` without
+    dv/dt and weight."""
     inverse_dynamics(m, w, v, v[:0], (0.0, 0.0, 0.0), out)

@@ -19,21 +19,26 @@ UNIT_TOLERANCE = 1e-6
 
 @kernel
 def misplaced_body(m, q):
-    """Return the first body with an entry that is not finite, or a quaternion or pair not of length one; −1: none."""
+    """Return the first body with an entry that is not finite, or a quaternion or pair not of length
+    one; −1: none."""
     for b in range(m.kind.shape[0]):
         first = m.q_start[b]
         stop = m.q_start[b + 1] if b + 1 < m.kind.shape[0] else q.shape[0]
         square = 0.0
         for i in range(first + 3 if m.kind[b] == FREE_FLYER else first, stop):
             square += q[i] * q[i]
-        if not (all_finite(q[first:stop]) and (is_vector(m.kind[b]) or abs(sqrt(square) - 1.0) <= UNIT_TOLERANCE)):
+        if not (
+            all_finite(q[first:stop])
+            and (is_vector(m.kind[b]) or abs(sqrt(square) - 1.0) <= UNIT_TOLERANCE)
+        ):
             return b
     return -1
 
 
 @kernel
 def mass_matrices_at(m, w, q, out):
-    """out (n, d, d) <- M at each of n configurations q (n, nq); return False at the first that is not valid."""
+    """out (n, d, d) <- M at each of n configurations q (n, nq); return False at the first that is
+    not valid."""
     for k in range(q.shape[0]):
         if misplaced_body(m, q[k]) >= 0:
             return False
@@ -44,7 +49,8 @@ def mass_matrices_at(m, w, q, out):
 
 @kernel
 def biases_at(m, w, q, v, out):
-    """out (n, d) <- B at each of n states, q (n, nq) and v (n, d); return False at the first that is not valid."""
+    """out (n, d) <- B at each of n states, q (n, nq) and v (n, d); return False at the first that
+    is not valid."""
     for k in range(q.shape[0]):
         if misplaced_body(m, q[k]) >= 0 or not all_finite(v[k]):
             return False
@@ -55,7 +61,8 @@ def biases_at(m, w, q, v, out):
 
 @kernel
 def rows_along(m, w, q, body, point, direction, out):
-    """out (n, d) <- Jacobian rows of n world points, each fixed to a body (-1: the world), along directions."""
+    """out (n, d) <- Jacobian rows of n world points, each fixed to a body (-1: the world), along
+    directions."""
     for i in range(q.shape[0]):
         forward_kinematics(m, q[i], w)
         out[i] = 0.0
@@ -74,9 +81,11 @@ def center_velocity(w, b):
 
 @kernel
 def energies_along(m, w, q, v, g, kinetic, potential):
-    """kinetic, potential (n,) [J] <- the energies at the n states of a trajectory q (n, nq), v (n, d).
+    """kinetic, potential (n,) [J] <- the energies at the n states of a trajectory q (n, nq), v (n,
+    d).
 
-    Kinetic: the sum of (m |v_c|^2 + omega . I omega) / 2; potential: that of -m g . c over the bodies that can move.
+    Kinetic: the sum of (m |v_c|^2 + omega . I omega) / 2; potential: that of -m g . c over the
+    bodies that can move.
     """
     for k in range(q.shape[0]):
         forward_kinematics(m, q[k], w)
@@ -91,7 +100,8 @@ def energies_along(m, w, q, v, g, kinetic, potential):
 
 @kernel
 def centroidal_momentum(m, w, v, out):
-    """out (6,) <- linear momentum [N s] and angular momentum [N m s] about the moving bodies' centre of mass."""
+    """out (6,) <- linear momentum [N s] and angular momentum [N m s] about the moving bodies'
+    centre of mass."""
     body_velocities(m, w, v)
     mass, first_moment, linear, angular = 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for b in range(m.kind.shape[0]):
@@ -110,7 +120,8 @@ def centroidal_momentum(m, w, v, out):
 
 @kernel
 def impact_loss(mass_matrix, lower, v, impulse, change):
-    """Return -(v . P + P . M^-1 P / 2) [J], the kinetic energy that the impulse P takes; lower, change: scratch."""
+    """Return -(v . P + P . M^-1 P / 2) [J], the kinetic energy that the impulse P takes; lower,
+    change: scratch."""
     cholesky(mass_matrix, lower)
     solve_mass(lower, impulse, change)
     total = 0.0
@@ -121,7 +132,8 @@ def impact_loss(mass_matrix, lower, v, impulse, change):
 
 @kernel
 def poses_along(m, w, q, out):
-    """out (n, bodies, 3 or 7) <- the pose of every body at each row of q (n, nq), see `Mechanism.poses`."""
+    """out (n, bodies, 3 or 7) <- the pose of every body at each row of q (n, nq), see
+    `Mechanism.poses`."""
     for k in range(q.shape[0]):
         forward_kinematics(m, q[k], w)
         for b in range(out.shape[1]):
@@ -135,25 +147,37 @@ def poses_along(m, w, q, out):
 
 @kernel
 def write_quaternion(r, q):
-    """q <- x, y, z, w >= 0 of a rotation (3, 3), computed from the largest of them to avoid cancellation."""
+    """q <- x, y, z, w >= 0 of a rotation (3, 3), computed from the largest of them to avoid
+    cancellation."""
     trace = r[0, 0] + r[1, 1] + r[2, 2]
     i = 0 if r[0, 0] >= r[1, 1] and r[0, 0] >= r[2, 2] else 1 if r[1, 1] >= r[2, 2] else 2
     j, k = (i + 1) % 3, (i + 2) % 3
     if trace > r[i, i]:
         s = 2.0 * sqrt(1.0 + trace)
-        q[i], q[j], q[k], q[3] = (r[k, j] - r[j, k]) / s, (r[i, k] - r[k, i]) / s, (r[j, i] - r[i, j]) / s, 0.25 * s
+        q[i], q[j], q[k], q[3] = (
+            (r[k, j] - r[j, k]) / s,
+            (r[i, k] - r[k, i]) / s,
+            (r[j, i] - r[i, j]) / s,
+            0.25 * s,
+        )
     else:
         s = 2.0 * sqrt(1.0 + r[i, i] - r[min(j, k), min(j, k)] - r[max(j, k), max(j, k)])
         s = s if r[k, j] >= r[j, k] else -s
-        q[i], q[j], q[k], q[3] = 0.25 * s, (r[i, j] + r[j, i]) / s, (r[i, k] + r[k, i]) / s, (r[k, j] - r[j, k]) / s
+        q[i], q[j], q[k], q[3] = (
+            0.25 * s,
+            (r[i, j] + r[j, i]) / s,
+            (r[i, k] + r[k, i]) / s,
+            (r[k, j] - r[j, k]) / s,
+        )
 
 
 @kernel
 def displacements_along(m, q, straight, out):
     """out (n - 1, d) <- the displacement of each step of a trajectory q (n, nq), see `difference`.
 
-    With `straight`, that of a free flyer is the path of its centre of mass, in body axes at the start of the step,
-    minus phi x c: the work of a force that keeps its direction in the world, where `difference` gives a screw motion.
+    With `straight`, that of a free flyer is the path of its centre of mass, in body axes at the
+    start of the step, minus phi x c: the work of a force that keeps its direction in the world,
+    where `difference` gives a screw motion.
     """
     for k in range(out.shape[0]):
         difference(m, q[k], q[k + 1], out[k])

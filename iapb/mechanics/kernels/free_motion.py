@@ -1,18 +1,23 @@
 """Free motion over a step: it keeps momentum in the world's axes and makes no kinetic energy.
 
-A step applies forces and impulses at its start (the kick); free motion then moves each tree for Δt (the drift).
+A step applies forces and impulses at its start (the kick); free motion then moves each tree for Δt
+(the drift).
 
 STRAIGHT  M is constant and B = 0, such as a body in the plane or a slide: q moves with v.
-RIGID     one rigid body that turns freely or about a fixed point. Its angular momentum l in body axes turns against the
-          body, so R l is constant. With the principal moments I_1 <= I_2 <= I_3 the energy |l|²/2I_2 turns the body
-          about l, exactly; the rest, ½(1/I_1 − 1/I_2) l_1² + ½(1/I_3 − 1/I_2) l_3², is split into turns about the axes
-          1, 3, 1 (Dullweber, Leimkuhler and McLachlan, J. Chem. Phys. 107, 1997), three times with the steps of Yoshida
-          (Phys. Lett. A 150, 1990). The motion is exact for a ball and for a body with two equal moments, and of fourth
-          order otherwise. The centre of mass moves straight.
-LINKAGE   velocity Verlet: q moves with v + Δt a/2, and v changes by the mean of a = −M⁻¹B at both ends. The velocity of
-          a root that moves freely then follows from the conserved momentum, its position from the straight path of
-          the centre of mass, and the rates of the joints are scaled so that the kinetic energy is that before.
-          Second order.
+RIGID     one rigid body that turns freely or about a fixed point. Its angular momentum l in body
+axes turns against the
+          body, so R l is constant. With the principal moments I_1 <= I_2 <= I_3 the energy
+          |l|²/2I_2 turns the body about l, exactly; the rest, ½(1/I_1 − 1/I_2) l_1² + ½(1/I_3 −
+          1/I_2) l_3², is split into turns about the axes
+          1, 3, 1 (Dullweber, Leimkuhler and McLachlan, J. Chem. Phys. 107, 1997), three times with
+          the steps of Yoshida (Phys. Lett. A 150, 1990). The motion is exact for a ball and for a
+          body with two equal moments, and of fourth order otherwise. The centre of mass moves
+          straight.
+LINKAGE   velocity Verlet: q moves with v + Δt a/2, and v changes by the mean of a = −M⁻¹B at both
+ends. The velocity of
+          a root that moves freely then follows from the conserved momentum, its position from the
+          straight path of the centre of mass, and the rates of the joints are scaled so that the
+          kinetic energy is that before. Second order.
 """
 
 from __future__ import annotations
@@ -24,16 +29,29 @@ import numpy as np
 
 from iapb.compiled import kernel
 from iapb.elementary import sine_cosine
-from iapb.linalg import add, cross, dot, load, scale, solve_mass, store, subtract, transform, transform_back
+from iapb.linalg import (
+    add,
+    cross,
+    dot,
+    load,
+    scale,
+    solve_mass,
+    store,
+    subtract,
+    transform,
+    transform_back,
+)
 from iapb.mechanics.joints import FREE_FLYER, PLANAR, SPHERICAL
 from iapb.mechanics.kernels.configuration import integrate_body, turn_quaternion, turn_vector
 
 STRAIGHT, RIGID, LINKAGE = range(3)
-# rad in a step: below the first, one turn of second order is exact to rounding; beyond the others, several parts
+# rad in a step: below the first, one turn of second order is exact to rounding; beyond the others,
+# several parts
 SLOW_ANGLE, RIGID_ANGLE, LINKAGE_ANGLE = 1e-4, 0.1, 0.02
 MOST_PARTS = 100
 YOSHIDA = 1.3512071919596578  # 1/(2 − 2^(1/3)), twice a step, with 1 − 2 × it in between
-STRETCH = 1.1  # largest factor on the rates of joints; a larger one would mean that the step is far too long
+# largest factor on the rates of joints; a larger one would mean that the step is far too long
+STRETCH = 1.1
 
 
 class FreeMotion(NamedTuple):
@@ -42,7 +60,9 @@ class FreeMotion(NamedTuple):
     kind: np.ndarray  # (t,) int64 STRAIGHT, RIGID or LINKAGE
     root: np.ndarray  # (t,) int64 first body that moves, −1 = none
     base: np.ndarray  # (t,) int64 number of root velocities with a conserved momentum
-    center: np.ndarray  # (t, 3) centre of mass of a RIGID tree [m]; zero if it turns about its origin
+    center: (
+        np.ndarray
+    )  # (t, 3) centre of mass of a RIGID tree [m]; zero if it turns about its origin
     axes: np.ndarray  # (t, 3, 3) its principal axes as rows, both in the root's axes
     moments: np.ndarray  # (t, 3) its principal moments [kg m²] about centre or origin, ascending
     turning: bool  # whether any tree is RIGID or a LINKAGE
@@ -51,11 +71,14 @@ class FreeMotion(NamedTuple):
 
 @kernel
 def turn_freely(free, t, q, i, v, k, dt):
-    """Turn the quaternion at q[i] and the spin at v[k] of the RIGID tree t for dt [s]; R l stays as it is."""
+    """Turn the quaternion at q[i] and the spin at v[k] of the RIGID tree t for dt [s]; R l stays as
+    it is."""
     axes, I = free.axes, (free.moments[t, 0], free.moments[t, 1], free.moments[t, 2])
     omega = transform(axes, t, (v[k], v[k + 1], v[k + 2]))
     l0, l1, l2 = I[0] * omega[0], I[1] * omega[1], I[2] * omega[2]
-    turn_quaternion(q, i, transform_back(axes, t, (dt * l0 / I[1], dt * l1 / I[1], dt * l2 / I[1])), q)
+    turn_quaternion(
+        q, i, transform_back(axes, t, (dt * l0 / I[1], dt * l1 / I[1], dt * l2 / I[1])), q
+    )
     first, third = 1.0 / I[0] - 1.0 / I[1], 1.0 / I[2] - 1.0 / I[1]
     if first != 0.0 or third != 0.0:
         turn = dt * sqrt(dot(omega, omega))
@@ -117,7 +140,8 @@ def move_simple_trees(m, free, tree_of_body, q, v, dt):
 
 @kernel(needs="linked", otherwise=1)
 def parts_of_linkages(m, free, start, stop, v, dt):
-    """Return the number of equal parts in which linkages move over the step, by their fastest rotating joint."""
+    """Return the number of equal parts in which linkages move over the step, by their fastest
+    rotating joint."""
     fastest = 0.0
     for t in range(free.kind.shape[0]):
         if free.kind[t] == LINKAGE:
@@ -129,7 +153,8 @@ def parts_of_linkages(m, free, start, stop, v, dt):
 
 @kernel
 def base_momentum(m, free, w, q, mass, start, stop, t, v, out):
-    """out (6,) <- momentum of the root's own dofs in axes that do not move; return the kinetic energy [J] of tree t."""
+    """out (6,) <- momentum of the root's own dofs in axes that do not move; return the kinetic
+    energy [J] of tree t."""
     energy = 0.0
     for i in range(start, stop):
         total = 0.0
@@ -144,7 +169,8 @@ def base_momentum(m, free, w, q, mass, start, stop, t, v, out):
 
 @kernel
 def to_fixed_axes(m, free, w, q, t, p, way):
-    """Turn the momentum p of a root into fixed axes and about the origin (way 1), or back to the root (way −1)."""
+    """Turn the momentum p of a root into fixed axes and about the origin (way 1), or back to the
+    root (way −1)."""
     b = free.root[t]
     if free.base[t] == 0:
         return
@@ -153,7 +179,9 @@ def to_fixed_axes(m, free, w, q, t, p, way):
         p[2] += way * (q[i] * p[1] - q[i + 1] * p[0])
     elif m.kind[b] == SPHERICAL:
         l = (p[0], p[1], p[2])
-        p[0], p[1], p[2] = transform(w.rotation, b, l) if way > 0.0 else transform_back(w.rotation, b, l)
+        p[0], p[1], p[2] = (
+            transform(w.rotation, b, l) if way > 0.0 else transform_back(w.rotation, b, l)
+        )
     else:
         place, linear, angular = load(w.position, b), (p[0], p[1], p[2]), (p[3], p[4], p[5])
         if way > 0.0:
@@ -168,7 +196,8 @@ def to_fixed_axes(m, free, w, q, t, p, way):
 
 @kernel
 def linear_momentum(m, free, t, p):
-    """Return the linear momentum [N s], in world axes, of a root's momentum in fixed axes; zero if it cannot move."""
+    """Return the linear momentum [N s], in world axes, of a root's momentum in fixed axes; zero if
+    it cannot move."""
     if free.base[t] == 0 or m.kind[free.root[t]] == SPHERICAL:
         return (0.0, 0.0, 0.0)
     return (p[0], p[1], 0.0 if m.kind[free.root[t]] == PLANAR else p[2])
@@ -187,14 +216,17 @@ def center_of(m, w, tree_of_body, t):
 
 @kernel
 def shift_root(m, free, w, tree_of_body, q, t, shift):
-    """Move tree t by a vector [m] in world axes: the root's coordinates and the placements in the workspace."""
+    """Move tree t by a vector [m] in world axes: the root's coordinates and the placements in the
+    workspace."""
     root = free.root[t]
     i = m.q_start[root]
     if m.kind[root] == PLANAR:
         k = m.v_start[root]
         local = (dot(load(w.axis, k), shift), dot(load(w.axis, k + 1), shift), 0.0)
     else:
-        local = turn_vector(q[i + 3], q[i + 4], q[i + 5], q[i + 6], transform_back(w.rotation, root, shift))
+        local = turn_vector(
+            q[i + 3], q[i + 4], q[i + 5], q[i + 6], transform_back(w.rotation, root, shift)
+        )
     q[i], q[i + 1] = q[i] + local[0], q[i + 1] + local[1]
     if m.kind[root] != PLANAR:
         q[i + 2] += local[2]
@@ -206,9 +238,11 @@ def shift_root(m, free, w, tree_of_body, q, t, shift):
 
 @kernel
 def keep_momentum_and_energy(mass, lower, start, stop, base, p, energy, v, scratch):
-    """Give the root the velocity of its momentum p and scale the other rates so that the kinetic energy is `energy`.
+    """Give the root the velocity of its momentum p and scale the other rates so that the kinetic
+    energy is `energy`.
 
-    With the root's momentum fixed, KE = ½ pᵀ M_bb⁻¹ p + ½ v_jᵀ S v_j: the second part is scaled. scratch : (d,)
+    With the root's momentum fixed, KE = ½ pᵀ M_bb⁻¹ p + ½ v_jᵀ S v_j: the second part is scaled.
+    scratch : (d,)
     """
     block = lower[start : start + base, start : start + base]
     solve_mass(block, p[:base], scratch[:base])

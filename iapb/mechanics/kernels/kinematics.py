@@ -2,7 +2,18 @@
 
 from iapb.compiled import kernel
 from iapb.elementary import sine_cosine
-from iapb.linalg import add, column, cross, load, scale, store, store_columns, subtract, transform, turn_frame
+from iapb.linalg import (
+    add,
+    column,
+    cross,
+    load,
+    scale,
+    store,
+    store_columns,
+    subtract,
+    transform,
+    turn_frame,
+)
 from iapb.mechanics.joints import CONTINUOUS, FIXED, FREE_FLYER, PLANAR, PRISMATIC, REVOLUTE
 
 
@@ -11,9 +22,13 @@ def turn_about_axis(w, b, a, c, s):
     """Rodrigues: R <- R (c 1 + (1 - c) a a^T + s [a]x), angle with cosine c and sine s."""
     x, y, z = a
     u = 1.0 - c
-    turn_frame(w.rotation, b, (c + u * x * x, u * x * y + s * z, u * x * z - s * y),
-               (u * x * y - s * z, c + u * y * y, u * y * z + s * x),
-               (u * x * z + s * y, u * y * z - s * x, c + u * z * z))
+    turn_frame(
+        w.rotation,
+        b,
+        (c + u * x * x, u * x * y + s * z, u * x * z - s * y),
+        (u * x * y - s * z, c + u * y * y, u * y * z + s * x),
+        (u * x * z + s * y, u * y * z - s * x, c + u * z * z),
+    )
 
 
 @kernel
@@ -29,7 +44,9 @@ def move_joint(m, q, w, b):
     kind, i, k = m.kind[b], m.q_start[b], m.v_start[b]
     if kind == PLANAR:  # axes of the joint frame: they do not turn with the body
         body_axes_to_dofs(w, b, k)
-        store(w.position, b, add(load(w.position, b), transform(w.rotation, b, (q[i], q[i + 1], 0.0))))
+        store(
+            w.position, b, add(load(w.position, b), transform(w.rotation, b, (q[i], q[i + 1], 0.0)))
+        )
         s, c = sine_cosine(q[i + 2])
         turn_about_axis(w, b, (0.0, 0.0, 1.0), c, s)
     elif kind == PRISMATIC:
@@ -42,19 +59,28 @@ def move_joint(m, q, w, b):
         turn_about_axis(w, b, a, c, s)
     elif kind != FIXED:  # a unit quaternion, after the position of a free flyer
         if kind == FREE_FLYER:
-            store(w.position, b, add(load(w.position, b), transform(w.rotation, b, (q[i], q[i + 1], q[i + 2]))))
+            store(
+                w.position,
+                b,
+                add(load(w.position, b), transform(w.rotation, b, (q[i], q[i + 1], q[i + 2]))),
+            )
             i += 3
         x, y, z, s = q[i], q[i + 1], q[i + 2], q[i + 3]
-        turn_frame(w.rotation, b, (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + s * z), 2.0 * (x * z - s * y)),
-                   (2.0 * (x * y - s * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + s * x)),
-                   (2.0 * (x * z + s * y), 2.0 * (y * z - s * x), 1.0 - 2.0 * (x * x + y * y)))
+        turn_frame(
+            w.rotation,
+            b,
+            (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + s * z), 2.0 * (x * z - s * y)),
+            (2.0 * (x * y - s * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + s * x)),
+            (2.0 * (x * z + s * y), 2.0 * (y * z - s * x), 1.0 - 2.0 * (x * x + y * y)),
+        )
         for first in range(k, k + m.v_count[b], 3):
             body_axes_to_dofs(w, b, first)
 
 
 @kernel
 def forward_kinematics(m, q, w):
-    """Fill rotation, position, center and axis of the workspace w for the configuration q, unless w holds q already.
+    """Fill rotation, position, center and axis of the workspace w for the configuration q, unless w
+    holds q already.
 
     Quaternions and (cos, sin) pairs must have length one; kernels do not check. A joint frame has
     R = R_parent R_placement, p = p_parent + R_parent p_placement.
@@ -76,13 +102,18 @@ def forward_kinematics(m, q, w):
         store_columns(R, b, x, y, z)
         store(w.position, b, offset)
         move_joint(m, q, w, b)
-        store(w.center, b, add(load(w.position, b), transform(w.rotation, b, load(m.center_of_mass, b))))
+        store(
+            w.center,
+            b,
+            add(load(w.position, b), transform(w.rotation, b, load(m.center_of_mass, b))),
+        )
 
 
-# Jacobians of points and frames, and forces at points, from the axes of the dofs (paper (1), J_i and J_h).
+# Jacobians of points and frames, and forces at points, from the axes of the dofs (paper (1), J_i
+# and J_h).
 #
-# Dof k moves point x of every body it carries with velocity a_k (translation) or a_k x (x - o_k) (rotation),
-# where o_k is the origin of the body that the dof moves.
+# Dof k moves point x of every body it carries with velocity a_k (translation) or a_k x (x - o_k)
+# (rotation), where o_k is the origin of the body that the dof moves.
 
 
 @kernel
@@ -94,7 +125,8 @@ def motion_at(m, w, k, x):
 
 @kernel
 def frame_jacobian(m, w, body, point, out):
-    """out (6, d) <- Jacobian of the velocity of the world point, fixed to the body, and of the angular velocity."""
+    """out (6, d) <- Jacobian of the velocity of the world point, fixed to the body, and of the
+    angular velocity."""
     out[:] = 0.0
     k = m.last_dof[body]
     while k >= 0:
@@ -108,7 +140,8 @@ def frame_jacobian(m, w, body, point, out):
 def add_point_force(m, w, body, point, force, out):
     """out (d,) += J^T force: force [N], world axes, on the body at the world point.
 
-    With a unit normal as force this adds the contact row n^T J. A body of -1, the static world, adds nothing.
+    With a unit normal as force this adds the contact row n^T J. A body of -1, the static world,
+    adds nothing.
     """
     if body < 0:
         return

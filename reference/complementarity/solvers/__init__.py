@@ -1,7 +1,8 @@
-"""The table of solvers. Each line names the module of a solver; its package is imported at the solver's first call.
+"""The table of solvers. Each line names the module of a solver; its package is imported at the
+solver's first call.
 
-A solver module has a function ``solve(problem) -> Answer``, which may raise SolverError to refuse a problem.
-To add a solver, write its module and add a line to SOLVERS.
+A solver module has a function ``solve(problem) -> Answer``, which may raise SolverError to refuse a
+problem. To add a solver, write its module and add a line to SOLVERS.
 """
 
 from __future__ import annotations
@@ -41,22 +42,39 @@ SOLVERS: dict[str, SolverEntry] = {
     "lemke": SolverEntry(f"{_HERE}.lemke", "quantecon", "complementary pivoting (Lemke)", "lcp"),
     "gauss_seidel": SolverEntry(f"{_HERE}.sweeps", "numba", "projected Gauss-Seidel", "lcp"),
     "daqp": SolverEntry(f"{_HERE}.qp", "daqp", "dual active set", "convex", "daqp"),
-    "quadprog": SolverEntry(f"{_HERE}.qp", "qpsolvers quadprog", "Goldfarb-Idnani active set", "convex", "quadprog"),
-    "proxqp": SolverEntry(f"{_HERE}.qp", "qpsolvers proxsuite", "proximal augmented Lagrangian", "convex", "proxqp"),
-    "cvxpy_clarabel": SolverEntry(f"{_HERE}.cones", "cvxpy clarabel", "interior point", "convex", "CLARABEL"),
+    "quadprog": SolverEntry(
+        f"{_HERE}.qp", "qpsolvers quadprog", "Goldfarb-Idnani active set", "convex", "quadprog"
+    ),
+    "proxqp": SolverEntry(
+        f"{_HERE}.qp", "qpsolvers proxsuite", "proximal augmented Lagrangian", "convex", "proxqp"
+    ),
+    "cvxpy_clarabel": SolverEntry(
+        f"{_HERE}.cones", "cvxpy clarabel", "interior point", "convex", "CLARABEL"
+    ),
     "cvxpy_osqp": SolverEntry(f"{_HERE}.cones", "cvxpy osqp", "ADMM", "convex", "OSQP"),
-    "cvxpy_scs": SolverEntry(f"{_HERE}.cones", "cvxpy scs", "ADMM on the conic form", "convex", "SCS"),
+    "cvxpy_scs": SolverEntry(
+        f"{_HERE}.cones", "cvxpy scs", "ADMM on the conic form", "convex", "SCS"
+    ),
     "nsgs": SolverEntry(f"{_HERE}.sweeps", "numba", "block Gauss-Seidel on the cones", "cone"),
-    "cvxpy_socp": SolverEntry(f"{_HERE}.cones", "cvxpy clarabel", "interior point, fixed point", "cone", "socp"),
-    "pinocchio_pgs": SolverEntry(_PINOCCHIO, "pinocchio", "projected Gauss-Seidel", "cone", option="PGS"),
+    "cvxpy_socp": SolverEntry(
+        f"{_HERE}.cones", "cvxpy clarabel", "interior point, fixed point", "cone", "socp"
+    ),
+    "pinocchio_pgs": SolverEntry(
+        _PINOCCHIO, "pinocchio", "projected Gauss-Seidel", "cone", option="PGS"
+    ),
     "pinocchio_admm": SolverEntry(_PINOCCHIO, "pinocchio", "ADMM", "cone", option="ADMM"),
-}  # fmt: skip
+}
 
 
 def solver_names(problem: ImpactProblem | None = None) -> tuple[str, ...]:
-    """Return the solvers' names; with a problem, only those that take its kind (friction or not)."""
+    """Return the solvers' names; with a problem, only those that take its kind (friction or
+    not)."""
     cone = problem is not None and problem.friction is not None
-    return tuple(name for name, entry in SOLVERS.items() if problem is None or (entry.takes == "cone") == cone)
+    return tuple(
+        name
+        for name, entry in SOLVERS.items()
+        if problem is None or (entry.takes == "cone") == cone
+    )
 
 
 def solve(problem: ImpactProblem, solver: str = "daqp") -> Solution:
@@ -80,10 +98,19 @@ def solve(problem: ImpactProblem, solver: str = "daqp") -> Solution:
         if (entry.takes == "cone") != (problem.friction is not None):
             kind = "problems with friction" if entry.takes == "cone" else "frictionless problems"
             raise SolverError(f"refused: takes {kind} only")
-        answer = call(problem, *filter(None, [entry.option])) if problem.size else Answer(np.zeros(0), "no contacts")
+        answer = (
+            call(problem, *filter(None, [entry.option]))
+            if problem.size
+            else Answer(np.zeros(0), "no contacts")
+        )
     except SolverError as error:
         answer = Answer(None, str(error), refused=str(error).startswith("refused"))
-    except (ArithmeticError, LookupError, RuntimeError, ValueError) as error:  # raised inside a foreign package
+    except (
+        ArithmeticError,
+        LookupError,
+        RuntimeError,
+        ValueError,
+    ) as error:  # raised inside a foreign package
         answer = Answer(None, f"{type(error).__name__}: {error}")
     seconds = time.perf_counter() - started
     impulse = None if answer.impulse is None else np.asarray(answer.impulse, dtype=np.float64)
@@ -93,8 +120,9 @@ def solve(problem: ImpactProblem, solver: str = "daqp") -> Solution:
 def import_alone(name: str) -> ModuleType:
     """Import a module of another package, one process at a time.
 
-    If two processes import quantecon for the first time at once, they corrupt its cache of compiled code, and every
-    later import aborts with "LLVM ERROR: Symbol not found: __gufunc__...". The lock is on the package's own file.
+    If two processes import quantecon for the first time at once, they corrupt its cache of compiled
+    code, and every later import aborts with "LLVM ERROR: Symbol not found: __gufunc__...". The lock
+    is on the package's own file.
     """
     package = name.partition(".")[0]
     found = find_spec(package)

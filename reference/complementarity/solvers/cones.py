@@ -1,9 +1,10 @@
 """Contacts with or without friction as programs on Coulomb's cones, by cvxpy's backends.
 
-The cone program is the relaxed law,  min ½|Aᵀp|² + bᵀp  over the cones, or p >= 0. Coulomb's law is that program with
-the shift mu |u_T| of the last solution added to the normal part of b. The shift depends on the solution, so the program
-is solved repeatedly until the shift is constant (convergence is not guaranteed).
-Source: Anitescu and Tasora, Comput. Optim. Appl. 47 (2010); Acary, Cadoux, Lemaréchal, Malick, ZAMM 91 (2011).
+The cone program is the relaxed law,  min ½|Aᵀp|² + bᵀp  over the cones, or p >= 0. Coulomb's law is
+that program with the shift mu |u_T| of the last solution added to the normal part of b. The shift
+depends on the solution, so the program is solved repeatedly until the shift is constant
+(convergence is not guaranteed). Source: Anitescu and Tasora, Comput. Optim. Appl. 47 (2010); Acary,
+Cadoux, Lemaréchal, Malick, ZAMM 91 (2011).
 """
 
 from __future__ import annotations
@@ -16,14 +17,26 @@ import numpy as np
 from reference.complementarity.problem import ImpactProblem
 from reference.complementarity.solution import Answer, velocity_scale
 
-_ROUNDS, _STILL = 50, 1e-9  # of cone programs; change of the shift, share of the velocity scale, at which they stop
-# Backends and accuracy requested at unit W and b; the defaults are 1e-4 to 1e-6. Near the apex of cones, the natural
-# map reaches its square root. Without friction, below 1e-11, Clarabel drifts along the unbounded set of impulses of
-# opposed contacts (p to 6e9, residual up to 4e-6).
+_ROUNDS, _STILL = (
+    50,
+    1e-9,
+)  # of cone programs; change of the shift, share of the velocity scale, at which they stop
+# Backends and accuracy requested at unit W and b; the defaults are 1e-4 to 1e-6. Near the apex of
+# cones, the natural map reaches its square root. Without friction, below 1e-11, Clarabel drifts
+# along the unbounded set of impulses of opposed contacts (p to 6e9, residual up to 4e-6).
 _BACKENDS: dict[str, tuple[str, dict[str, Any]]] = {
     "socp": ("CLARABEL", {"tol_gap_abs": 1e-12, "tol_gap_rel": 1e-12, "tol_feas": 1e-12}),
     "CLARABEL": ("CLARABEL", {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11}),
-    "OSQP": ("OSQP", {"eps_abs": 1e-9, "eps_rel": 1e-9, "max_iter": 20_000, "polishing": True, "time_limit": 10.0}),
+    "OSQP": (
+        "OSQP",
+        {
+            "eps_abs": 1e-9,
+            "eps_rel": 1e-9,
+            "max_iter": 20_000,
+            "polishing": True,
+            "time_limit": 10.0,
+        },
+    ),
     "SCS": ("SCS", {"eps_abs": 1e-9, "eps_rel": 1e-9, "max_iters": 20_000}),
 }
 
@@ -31,14 +44,18 @@ _BACKENDS: dict[str, tuple[str, dict[str, Any]]] = {
 def solve(problem: ImpactProblem, method: str) -> Answer:
     """Return the impulse by programs of _BACKENDS; its residuals show whether it converged.
 
-    The program has the factor A, not a quadratic form of W, because redundant contacts make W rank deficient.
+    The program has the factor A, not a quadratic form of W, because redundant contacts make W rank
+    deficient.
     """
     import cvxpy as cp
 
     backend, settings = _BACKENDS[method]
     rows, speed, mu = problem.factor, velocity_scale(problem), problem.friction_or_zero
     root = float(np.linalg.norm(rows, axis=1).max(initial=0.0)) or 1.0
-    p, offset = cp.Variable(problem.size), cp.Parameter(problem.size)  # a parameter makes repeated solves cheap
+    p, offset = (
+        cp.Variable(problem.size),
+        cp.Parameter(problem.size),
+    )  # a parameter makes repeated solves cheap
     blocks = cp.reshape(p, (problem.contact_size, problem.contacts), order="F")
     rough, smooth = (np.flatnonzero(kind) for kind in (mu > 0.0, mu == 0.0))
     cones: list[Any] = []
@@ -54,7 +71,9 @@ def solve(problem: ImpactProblem, method: str) -> Answer:
         scaled[:: problem.contact_size] += shift
         offset.value = scaled
         try:
-            with warnings.catch_warnings():  # "may be inaccurate": the status says so too, and residuals are recomputed
+            with (
+                warnings.catch_warnings()
+            ):  # "may be inaccurate": the status says so too, and residuals are recomputed
                 warnings.simplefilter("ignore", UserWarning)
                 program.solve(solver=backend, **settings)
         except cp.error.SolverError as error:

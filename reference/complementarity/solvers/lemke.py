@@ -1,7 +1,9 @@
-"""Lemke's complementary pivoting (quantecon), for any W: find z >= 0 with W z + b >= 0 and z·(W z + b) = 0.
+"""Lemke's complementary pivoting (quantecon), for any W: find z >= 0 with W z + b >= 0 and z·(W z +
+b) = 0.
 
-Source: Lemke, Management Science 11 (1965); Cottle, Pang, Stone, Linear Complementarity (1992), 4.4.
-With a semidefinite, degenerate W, rounding can end a solvable problem on a ray; the answer then reports this.
+Source: Lemke, Management Science 11 (1965); Cottle, Pang, Stone, Linear Complementarity (1992),
+4.4. With a semidefinite, degenerate W, rounding can end a solvable problem on a ray; the answer
+then reports this.
 """
 
 from __future__ import annotations
@@ -26,7 +28,10 @@ def import_lcp_lemke() -> Callable[..., Any]:
 def solve(problem: ImpactProblem) -> Answer:
     """Return Lemke's solution, or none if it ends on a ray."""
     lcp_lemke = import_lcp_lemke()
-    inertia, speed = float(np.abs(problem.delassus).max(initial=0.0)) or 1.0, velocity_scale(problem)
+    inertia, speed = (
+        float(np.abs(problem.delassus).max(initial=0.0)) or 1.0,
+        velocity_scale(problem),
+    )
     result = lcp_lemke(problem.delassus / inertia, problem.offset / speed)
     note = f"{_STATUS.get(result.status, result.status)} after {result.num_iter} pivots"
     return Answer(result.z * speed / inertia if result.success else None, note)

@@ -1,12 +1,13 @@
 """Convex quadratic programs of frictionless contacts, W = A Aᵀ, in one of two forms.
 
-Velocity form: min ½|x|² subject to A x + b >= 0. Here x = Aᵀp is the change of velocity in kinetic coordinates, and p
-are the multipliers. The Hessian is the identity for any rank of W, so redundant contacts are no problem.
-Impulse form: min ½|Aᵀp|² + bᵀp subject to p >= 0 (cvxpy's backends: `cones`). If all contacts have the same e, then
-b = (1 + e) A u, and the objective is ½|Aᵀp + (1 + e) u|² up to a constant (Moreau; Anitescu and Potra, Nonlinear
-Dynamics 14, 1997).
-Source: daqp, Arnström, Bemporad, Axehill, IEEE Transactions on Automatic Control 67 (2022); quadprog, Goldfarb, Idnani,
-Mathematical Programming 27 (1983); proxqp, Bambade and others, Robotics: Science and Systems (2022).
+Velocity form: min ½|x|² subject to A x + b >= 0. Here x = Aᵀp is the change of velocity in kinetic
+coordinates, and p are the multipliers. The Hessian is the identity for any rank of W, so redundant
+contacts are no problem. Impulse form: min ½|Aᵀp|² + bᵀp subject to p >= 0 (cvxpy's backends:
+`cones`). If all contacts have the same e, then b = (1 + e) A u, and the objective is ½|Aᵀp + (1 +
+e) u|² up to a constant (Moreau; Anitescu and Potra, Nonlinear Dynamics 14, 1997).
+Source: daqp, Arnström, Bemporad, Axehill, IEEE Transactions on Automatic Control 67 (2022);
+quadprog, Goldfarb, Idnani, Mathematical Programming 27 (1983); proxqp, Bambade and others,
+Robotics: Science and Systems (2022).
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ from reference.complementarity.solution import Answer, velocity_scale
 _INEQUALITY = 0  # daqp's `sense` of a row
 _ACTIVE_SET = 1e-13  # accuracy for unit rows and unit velocities: a few hundred roundings
 _INFINITE = 1e30  # daqp's value for an absent bound
-_PROXQP = 1e-10  # accuracy requested for a problem scaled to unit W and b; the reached accuracy is measured
+# accuracy requested for a problem scaled to unit W and b; the reached accuracy is measured
+_PROXQP = 1e-10
 
 
 def solve(problem: ImpactProblem, method: str) -> Answer:
@@ -36,7 +38,8 @@ def solve(problem: ImpactProblem, method: str) -> Answer:
 def daqp(rows: Floats, offset: Floats) -> Floats:
     """Return p (n,) of  0 <= p ⟂ A Aᵀ p + b >= 0  for A (n, d) and b (n,).
 
-    daqp is called itself, because qpsolvers does not tell an infeasible program from another failure.
+    daqp is called itself, because qpsolvers does not tell an infeasible program from another
+    failure.
 
     Raises
     ------
@@ -47,24 +50,37 @@ def daqp(rows: Floats, offset: Floats) -> Floats:
 
     n, d = rows.shape
     length = np.sqrt(np.einsum("ij,ij->i", rows, rows))
-    unit = np.where(length > 0.0, length, 1.0)  # unit rows, unit velocities: daqp's tolerances are absolute
+    unit = np.where(
+        length > 0.0, length, 1.0
+    )  # unit rows, unit velocities: daqp's tolerances are absolute
     scale = float(np.abs(offset / unit).max(initial=0.0)) or 1.0
     upper, lower = np.full(n, _INFINITE), -offset / unit / scale
     sense = np.full(n, _INEQUALITY, dtype=np.int32)
-    _, _, flag, detail = daqp.solve(np.eye(d), np.zeros(d), np.ascontiguousarray(rows / unit[:, None]), upper, lower,
-                                    sense, primal_tol=_ACTIVE_SET, dual_tol=_ACTIVE_SET)  # fmt: skip
+    _, _, flag, detail = daqp.solve(
+        np.eye(d),
+        np.zeros(d),
+        np.ascontiguousarray(rows / unit[:, None]),
+        upper,
+        lower,
+        sense,
+        primal_tol=_ACTIVE_SET,
+        dual_tol=_ACTIVE_SET,
+    )
     if flag < 1:
         raise SolverError(f"daqp: exit flag {flag}" + (", infeasible" if flag == -1 else ""))
     return -np.asarray(detail["lam"]) * scale / unit
 
 
 def quadprog(rows: Floats, offset: Floats) -> Floats:
-    """Return p (n,) as `daqp` does; quadprog can mistake redundant rows for contradictory ones (SolverError)."""
+    """Return p (n,) as `daqp` does; quadprog can mistake redundant rows for contradictory ones
+    (SolverError)."""
     from qpsolvers import Problem, solve_problem
 
     d, length = rows.shape[1], np.linalg.norm(rows, axis=1)
     unit = np.where(length > 0.0, length, 1.0)
-    answer = solve_problem(Problem(np.eye(d), np.zeros(d), -rows / unit[:, None], offset / unit), solver="quadprog")
+    answer = solve_problem(
+        Problem(np.eye(d), np.zeros(d), -rows / unit[:, None], offset / unit), solver="quadprog"
+    )
     if not answer.found or answer.z is None:
         raise SolverError("quadprog: no solution found")
     return np.asarray(answer.z) / unit

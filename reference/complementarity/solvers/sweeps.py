@@ -1,11 +1,13 @@
-"""Sweeps over contacts: projected Gauss-Seidel without friction, nonsmooth block Gauss-Seidel (NSGS) on the cones.
+"""Sweeps over contacts: projected Gauss-Seidel without friction, nonsmooth block Gauss-Seidel
+(NSGS) on the cones.
 
-Without friction, p_i <- max(0, p_i − w_i / W_ii). With friction, p_k <- proj_K(p_k − rho_k (u_k + shift_k)), a few
-times per contact and sweep; the shift is mu |u_T| of Coulomb's law (none if relaxed), and 1/rho_k is the largest
-eigenvalue of the contact's own block of W. Both end with a sweep that changes nothing. They converge for symmetric
-positive semidefinite W if a solution exists, but slowly for stacks and nearly dependent contacts.
-Source: Cottle, Pang, Stone (1992), section 5.3 (projected SOR with factor 1); Jourdan, Alart, Jean, Comput. Methods
-Appl. Mech. Eng. 155 (1998); Acary and Brogliato (2008), section 13.7.
+Without friction, p_i <- max(0, p_i − w_i / W_ii). With friction, p_k <- proj_K(p_k − rho_k (u_k +
+shift_k)), a few times per contact and sweep; the shift is mu |u_T| of Coulomb's law (none if
+relaxed), and 1/rho_k is the largest eigenvalue of the contact's own block of W. Both end with a
+sweep that changes nothing. They converge for symmetric positive semidefinite W if a solution
+exists, but slowly for stacks and nearly dependent contacts. Source: Cottle, Pang, Stone (1992),
+section 5.3 (projected SOR with factor 1); Jourdan, Alart, Jean, Comput. Methods Appl. Mech. Eng.
+155 (1998); Acary and Brogliato (2008), section 13.7.
 """
 
 from __future__ import annotations
@@ -21,11 +23,15 @@ from reference.complementarity.problem import ImpactProblem
 from reference.complementarity.solution import Answer, velocity_scale
 
 _SWEEPS = 20_000
-_WORK = 1e9  # multiplications, about 2 s: larger frictionless problems get fewer sweeps, but at least _LEAST_SWEEPS
+# multiplications, about 2 s: larger frictionless problems get fewer sweeps, but at least
+# _LEAST_SWEEPS
+_WORK = 1e9
 _LEAST_SWEEPS = 500
-# Stop after a sweep that changes no contact velocity by more than this share of the scale, without and with friction.
+# Stop after a sweep that changes no contact velocity by more than this share of the scale, without
+# and with friction.
 _STILL, _STILL_ON_CONES = 1e-14, 1e-13
-_INNER = 4  # projections per contact and sweep: one is enough for a scalar block, friction blocks need more
+# projections per contact and sweep: one is enough for a scalar block, friction blocks need more
+_INNER = 4
 
 
 def solve(problem: ImpactProblem) -> Answer:
@@ -35,17 +41,21 @@ def solve(problem: ImpactProblem) -> Answer:
     if (np.diag(problem.delassus) < 0.0).any():
         raise SolverError("refused: W has a negative diagonal entry")
     p, done = _projected(problem.delassus, problem.offset, velocity_scale(problem))
-    return Answer(p, f"converged after {done} sweeps" if done >= 0 else "not converged after the last sweep")
+    return Answer(
+        p, f"converged after {done} sweeps" if done >= 0 else "not converged after the last sweep"
+    )
 
 
 def projected_sweeps(rows: Floats, offset: Floats) -> Floats:
-    """Return p (n,) of  0 <= p ⟂ A Aᵀ p + b >= 0  for A (n, d) and b (n,), after the last sweep without friction."""
+    """Return p (n,) of  0 <= p ⟂ A Aᵀ p + b >= 0  for A (n, d) and b (n,), after the last sweep
+    without friction."""
     scale = float(np.abs(offset).max(initial=0.0)) or 1.0
     return _projected(rows @ rows.T, offset, scale)[0]
 
 
 def _projected(w: Floats, b: Floats, scale: float) -> tuple[Floats, int]:
-    """Return p (n,) after the last sweep, and the number of sweeps, or -1 if the limit is reached."""
+    """Return p (n,) after the last sweep, and the number of sweeps, or -1 if the limit is
+    reached."""
     p = np.zeros(len(b))
     sweeps = max(_LEAST_SWEEPS, min(_SWEEPS, int(_WORK / max(1, len(b)) ** 2)))
     return p, _sweep_lines(np.ascontiguousarray(w), b, p, sweeps, _STILL * scale)
@@ -81,10 +91,21 @@ def _on_cones(problem: ImpactProblem, sweeps: int = _SWEEPS) -> Answer:
     inertia = np.linalg.norm(blocks, ord=2, axis=(1, 2))
     inertia[inertia == 0.0] = 1.0
     p = np.zeros(problem.size)
-    done = _sweep_cones(np.ascontiguousarray(problem.delassus), problem.offset, problem.friction_or_zero,
-                        inertia, problem.relaxed, p, np.zeros(size), np.zeros(size), sweeps,
-                        _STILL_ON_CONES * velocity_scale(problem))  # fmt: skip
-    return Answer(p, f"converged after {done} sweeps" if done >= 0 else f"not converged after {sweeps} sweeps")
+    done = _sweep_cones(
+        np.ascontiguousarray(problem.delassus),
+        problem.offset,
+        problem.friction_or_zero,
+        inertia,
+        problem.relaxed,
+        p,
+        np.zeros(size),
+        np.zeros(size),
+        sweeps,
+        _STILL_ON_CONES * velocity_scale(problem),
+    )
+    return Answer(
+        p, f"converged after {done} sweeps" if done >= 0 else f"not converged after {sweeps} sweeps"
+    )
 
 
 @numba.njit(cache=True, fastmath=False)

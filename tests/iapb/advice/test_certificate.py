@@ -1,4 +1,5 @@
-"""The exact judge of recorded impacts finds every gain of one unit in the last place, and nothing else."""
+"""The exact judge of recorded impacts finds every gain of one unit in the last place, and nothing
+else."""
 
 from __future__ import annotations
 
@@ -11,14 +12,23 @@ import numpy as np
 import pytest
 
 import iapb.advice.certificate
-from iapb import ArgumentError, IapbError, certify, certify_impacts, find_scene, load_scene, simulate
+from iapb import (
+    ArgumentError,
+    IapbError,
+    certify,
+    certify_impacts,
+    find_scene,
+    load_scene,
+    simulate,
+)
 from iapb.advice.certificate import exact_gain, judge_gains
 from iapb.contact.laws import ImpulseAugmented
 from iapb.run import Run, digests
 
 
 def elastic(n: int, d: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """M, v and the velocity after elastic impacts on one row each, rounded without any clamp: half of them gain."""
+    """M, v and the velocity after elastic impacts on one row each, rounded without any clamp: half
+    of them gain."""
     rng = np.random.default_rng(seed)
     root, rows, v = rng.normal(size=(n, d, d)), rng.normal(size=(n, d)), rng.normal(size=(n, d))
     mass = root @ root.transpose(0, 2, 1) + np.eye(d)
@@ -29,9 +39,17 @@ def elastic(n: int, d: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.n
 
 def fractions_gain(mass: np.ndarray, before: np.ndarray, after: np.ndarray) -> Fraction:
     """KE⁺ − KE⁻ by rationals, entry by entry."""
+
     def energy(v: np.ndarray) -> Fraction:
         x = [Fraction(float(entry)) for entry in v]
-        return sum((Fraction(float(m)) * x[i] * x[j] for (i, j), m in np.ndenumerate(mass)), Fraction(0)) / 2
+        return (
+            sum(
+                (Fraction(float(m)) * x[i] * x[j] for (i, j), m in np.ndenumerate(mass)),
+                Fraction(0),
+            )
+            / 2
+        )
+
     return energy(after) - energy(before)
 
 
@@ -48,7 +66,8 @@ def test_every_impact_is_judged_as_rationals_judge_it(decades: int) -> None:
 
 
 def test_planted_gains_of_one_unit_in_the_last_place_are_all_found() -> None:
-    """v⁺ = −v keeps the energy exactly; one unit in the last place along the momentum gains, the other way loses."""
+    """v⁺ = −v keeps the energy exactly; one unit in the last place along the momentum gains, the
+    other way loses."""
     mass, v, _ = elastic(2000, 3, seed=2)
     w, rng = -v, np.random.default_rng(3)
     momentum = np.einsum("nij,nj->ni", mass, w)
@@ -77,53 +96,91 @@ def test_gains_below_any_bound_are_left_to_integers() -> None:
 def test_a_bound_that_disagrees_with_integers_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     def wrong(masses: np.ndarray, before: np.ndarray, after: np.ndarray, signs: np.ndarray) -> None:
         signs[:] = 1
+
     monkeypatch.setattr(iapb.advice.certificate, "gain_signs", wrong)
     with pytest.raises(IapbError, match="outside its double-double bounds"):
         judge_gains(np.eye(2), [[1.0, 1.0]], [[0.5, 0.5]])
 
 
-@pytest.mark.parametrize(("change", "argument"), [
-    ({"v_plus": [[1.0, 2.0, 3.0]]}, "v_plus"), ({"mass_matrix": np.eye(3)}, "mass_matrix"),
-    ({"v_minus": [[np.nan, 1.0]]}, "no finite double"), ({"v_minus": np.ones((1, 1, 2))}, "v_minus"),
-    ({"impulse": [[np.nan, 1.0]]}, "impulse"), ({"impulse": [[1.0]]}, "impulse"),
-    ({"v_minus": np.ones((9, 0))}, "d > 0"), ({"mass_matrix": [[1.0, 2.0], [2.0, 1.0]]}, "impact 0.*negative"),
-    *(({"mass_matrix": matrix}, "mass_matrix.*real numbers") for matrix in (
-        [[1.0 + 1e-3j, 0.0], [0.0, 1.0]], [["1", "0"], ["0", "1"]], [[1.0, 0.0], [0.0]],
-        np.ma.masked_array(np.eye(2), mask=True))),
-    *(({"mass_matrix": np.eye(2) * factor}, "finite double") for factor in (
-        1.0 + np.longdouble(1e-18), np.longdouble("1e400")))])  # fmt: skip
+@pytest.mark.parametrize(
+    ("change", "argument"),
+    [
+        ({"v_plus": [[1.0, 2.0, 3.0]]}, "v_plus"),
+        ({"mass_matrix": np.eye(3)}, "mass_matrix"),
+        ({"v_minus": [[np.nan, 1.0]]}, "no finite double"),
+        ({"v_minus": np.ones((1, 1, 2))}, "v_minus"),
+        ({"impulse": [[np.nan, 1.0]]}, "impulse"),
+        ({"impulse": [[1.0]]}, "impulse"),
+        ({"v_minus": np.ones((9, 0))}, "d > 0"),
+        ({"mass_matrix": [[1.0, 2.0], [2.0, 1.0]]}, "impact 0.*negative"),
+        *(
+            ({"mass_matrix": matrix}, "mass_matrix.*real numbers")
+            for matrix in (
+                [[1.0 + 1e-3j, 0.0], [0.0, 1.0]],
+                [["1", "0"], ["0", "1"]],
+                [[1.0, 0.0], [0.0]],
+                np.ma.masked_array(np.eye(2), mask=True),
+            )
+        ),
+        *(
+            ({"mass_matrix": np.eye(2) * factor}, "finite double")
+            for factor in (1.0 + np.longdouble(1e-18), np.longdouble("1e400"))
+        ),
+    ],
+)
 def test_wrong_arrays_are_refused_by_name(change: dict[str, object], argument: str) -> None:
-    good: dict[str, object] = {"mass_matrix": np.eye(2), "v_minus": [[1.0, 1.0]], "v_plus": [[0.5, 0.5]]}
+    good: dict[str, object] = {
+        "mass_matrix": np.eye(2),
+        "v_minus": [[1.0, 1.0]],
+        "v_plus": [[0.5, 0.5]],
+    }
     with pytest.raises(ArgumentError, match=argument):
         certify_impacts(**(good | change))  # type: ignore[arg-type]
 
 
 @pytest.fixture(scope="module")
 def cradle() -> Run:
-    return simulate(load_scene(find_scene("newton_cradle")).with_values({"contact.restitution": 1.0}))
+    return simulate(
+        load_scene(find_scene("newton_cradle")).with_values({"contact.restitution": 1.0})
+    )
 
 
 def forged(run: Run, where: str, value: Any, at: Any = 0) -> Run:
-    """The run with one entry of an array multiplied by a number, or replaced if it is one that is not finite."""
+    """The run with one entry of an array multiplied by a number, or replaced if it is one that is
+    not finite."""
     table, _, name = where.rpartition(".")
     part = getattr(run, table) if table else run
     array = getattr(part, name).copy()
     array[at] = array[at] * value if np.isfinite(value) else value
-    return replace(run, **{table: replace(part, **{name: array})}) if table else replace(part, **{name: array})
+    return (
+        replace(run, **{table: replace(part, **{name: array})})
+        if table
+        else replace(part, **{name: array})
+    )
 
 
 def kept(run: Run, count: int) -> Run:
     """The run with the first impacts of its record alone."""
     table = run.impacts
-    return replace(run, impacts=replace(table, **{f.name: getattr(table, f.name)[:count] for f in fields(table)}))
+    return replace(
+        run,
+        impacts=replace(table, **{f.name: getattr(table, f.name)[:count] for f in fields(table)}),
+    )
 
 
 def halved(run: Run) -> Run:
-    """Half of every change of velocity: no gain, momentum and range(Jᵀ) fit, but no impact of the scene's e."""
+    """Half of every change of velocity: no gain, momentum and range(Jᵀ) fit, but no impact of the
+    scene's e."""
     table, contacts = run.impacts, run.contacts
-    slower = replace(table, v_plus=0.5 * (table.v_minus + table.v_plus), impulse=0.5 * table.impulse)
-    return replace(run, impacts=slower, impulse=0.5 * run.impulse,
-                   contacts=replace(contacts, impulse=0.5 * contacts.impulse))
+    slower = replace(
+        table, v_plus=0.5 * (table.v_minus + table.v_plus), impulse=0.5 * table.impulse
+    )
+    return replace(
+        run,
+        impacts=slower,
+        impulse=0.5 * run.impulse,
+        contacts=replace(contacts, impulse=0.5 * contacts.impulse),
+    )
 
 
 @pytest.mark.parametrize("name", ["newton_cradle", "two_link_arm_a"])
@@ -145,11 +202,24 @@ def test_impacts_of_one_step_are_each_judged_by_their_own_velocities() -> None:
 # what is forged, and the residuals that fail; none of them gains energy but the first
 FORGED: dict[str, tuple[Callable[[Run], Run], set[str]]] = {
     "faster": (lambda run: forged(run, "impacts.v_plus", 1.0 + 1e-8), {"gains", "momentum"}),
-    "impulse of an impact": (lambda run: forged(run, "impacts.impulse", 1.0 + 1e-6), {"momentum", "total"}),
-    "impulse of a step": (lambda run: forged(run, "impulse", 1.0 + 1e-6, run.impacts.step[0]), {"total", "span"}),
-    "impulse of a contact": (lambda run: forged(run, "contacts.impulse", 1.0 + 1e-6,
-                                                np.flatnonzero(run.contacts.impulse)[0]), {"span"}),
-    "no impulse of contacts": (lambda run: forged(run, "contacts.impulse", 0.0, slice(None)), {"span"}),
+    "impulse of an impact": (
+        lambda run: forged(run, "impacts.impulse", 1.0 + 1e-6),
+        {"momentum", "total"},
+    ),
+    "impulse of a step": (
+        lambda run: forged(run, "impulse", 1.0 + 1e-6, run.impacts.step[0]),
+        {"total", "span"},
+    ),
+    "impulse of a contact": (
+        lambda run: forged(
+            run, "contacts.impulse", 1.0 + 1e-6, np.flatnonzero(run.contacts.impulse)[0]
+        ),
+        {"span"},
+    ),
+    "no impulse of contacts": (
+        lambda run: forged(run, "contacts.impulse", 0.0, slice(None)),
+        {"span"},
+    ),
     "no impact": (lambda run: kept(run, 0), {"total"}),
     "one impact": (lambda run: kept(run, 1), {"total"}),
     "all impacts but the last": (lambda run: kept(run, len(run.impacts.step) - 1), {"total"}),
@@ -169,15 +239,29 @@ def test_what_is_forged_in_a_record_fails_in_its_residual(cradle: Run, name: str
 def test_restitution_is_judged_under_the_plain_law_alone(cradle: Run) -> None:
     half = halved(cradle)
     budgeted = certify(replace(half, impacts=replace(half.impacts, rank=half.impacts.rows - 1)))
-    assert not budgeted.restitution_judged and "restitution (only reported)" in budgeted.words() and budgeted.passed
-    pushing = certify(simulate(load_scene(find_scene("newton_cradle")), ImpulseAugmented(pushing=True)))
+    assert (
+        not budgeted.restitution_judged
+        and "restitution (only reported)" in budgeted.words()
+        and budgeted.passed
+    )
+    pushing = certify(
+        simulate(load_scene(find_scene("newton_cradle")), ImpulseAugmented(pushing=True))
+    )
     assert pushing.passed and "Not judged: restitution" in pushing.words()
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
-@pytest.mark.parametrize("where", [*(f"impacts.{name}" for name in ("v_minus", "v_plus", "impulse", "scale")),
-                                   *(f"contacts.{name}" for name in ("impulse", "normal", "point")), "impulse"])
-def test_records_that_are_not_finite_are_refused_by_name(cradle: Run, where: str, value: float) -> None:
+@pytest.mark.parametrize(
+    "where",
+    [
+        *(f"impacts.{name}" for name in ("v_minus", "v_plus", "impulse", "scale")),
+        *(f"contacts.{name}" for name in ("impulse", "normal", "point")),
+        "impulse",
+    ],
+)
+def test_records_that_are_not_finite_are_refused_by_name(
+    cradle: Run, where: str, value: float
+) -> None:
     at = np.flatnonzero(cradle.contacts.impulse)[0] if where.startswith("contacts") else 0
     with pytest.raises(ArgumentError, match=where):
         certify(forged(cradle, where, value, at))
@@ -196,7 +280,8 @@ def test_a_run_without_impacts_has_nothing_to_certify() -> None:
 
 
 def test_a_group_scaled_to_a_device_gains_nothing() -> None:
-    """Elastic impacts under a force limit: shares of an impulse are certified as they are applied."""
+    """Elastic impacts under a force limit: shares of an impulse are certified as they are
+    applied."""
     scene = load_scene(find_scene("peg_corner")).with_values({"contact.restitution": 1.0})
     run = simulate(scene, ImpulseAugmented(rendering="scale"))
     assert (run.impacts.scale < 1.0).any() and certify(run).passed and certify(run).gains == 0
@@ -211,23 +296,37 @@ def test_plain_vectors_are_one_impact() -> None:
 
 
 def test_mass_matrix_that_is_made_again_must_be_the_recorded_one(cradle: Run) -> None:
-    """A configuration, a digest or the scene changed in the last bit: M is not the one whose digest is recorded."""
+    """A configuration, a digest or the scene changed in the last bit: M is not the one whose digest
+    is recorded."""
     table = cradle.impacts
-    assert table.mass_digest.all() and len(set(table.mass_digest)) == 1  # M of balls does not depend on where they are
+    assert (
+        table.mass_digest.all() and len(set(table.mass_digest)) == 1
+    )  # M of balls does not depend on where they are
     changed = table.mass_digest.copy()
     changed[1] += 1
-    heavier = cradle.scene_resolved | {"bodies": [
-        body | {"mass": np.nextafter(body["mass"], 2.0)} for body in cradle.scene_resolved["bodies"]]}
-    for forged, first in ((replace(cradle, impacts=replace(table, mass_digest=changed)), 1),
-                          (replace(cradle, scene_resolved=heavier), 0)):
+    heavier = cradle.scene_resolved | {
+        "bodies": [
+            body | {"mass": np.nextafter(body["mass"], 2.0)}
+            for body in cradle.scene_resolved["bodies"]
+        ]
+    }
+    for forged, first in (
+        (replace(cradle, impacts=replace(table, mass_digest=changed)), 1),
+        (replace(cradle, scene_resolved=heavier), 0),
+    ):
         with pytest.raises(IapbError, match=f"impact {first}: M"):
             certify(forged)
 
 
 def test_digest_is_of_m_made_again_which_in_the_engine_has_the_bits_of_the_step() -> None:
-    """On a moving arm the M inside the step of each impact, hashed there, has the digest recorded after the run."""
+    """On a moving arm the M inside the step of each impact, hashed there, has the digest recorded
+    after the run."""
     scene = load_scene(find_scene("three_link_arm_elastic"))
-    run, simulation, inside = simulate(scene, ImpulseAugmented(), steps=1000), iapb.Simulation(scene), []
+    run, simulation, inside = (
+        simulate(scene, ImpulseAugmented(), steps=1000),
+        iapb.Simulation(scene),
+        [],
+    )
     for step in range(run.steps):
         simulation.step()
         if step in run.impacts.step:
@@ -240,10 +339,19 @@ def test_a_share_that_overflows_does_not_pass() -> None:
     assert found.momentum == np.inf and not found.passed
 
 
-@pytest.mark.parametrize(("before", "after", "largest"), [
-    ([1e-10, 0.0], [1e300, 0.0], np.inf), ([1.0, 0.0], [1.0, 1e-200], 5e-324), ([0.0, 0.0], [0.0, 1e-200], np.inf),
-    ([1.0, 0.0], [1.0, 0.0], 0.0), ([0.0, 0.0], [0.0, 0.0], 0.0)])  # fmt: skip
-def test_a_gain_that_no_double_can_hold_is_a_gain(before: list[float], after: list[float], largest: float) -> None:
+@pytest.mark.parametrize(
+    ("before", "after", "largest"),
+    [
+        ([1e-10, 0.0], [1e300, 0.0], np.inf),
+        ([1.0, 0.0], [1.0, 1e-200], 5e-324),
+        ([0.0, 0.0], [0.0, 1e-200], np.inf),
+        ([1.0, 0.0], [1.0, 0.0], 0.0),
+        ([0.0, 0.0], [0.0, 0.0], 0.0),
+    ],
+)
+def test_a_gain_that_no_double_can_hold_is_a_gain(
+    before: list[float], after: list[float], largest: float
+) -> None:
     """The first raised, the second had 0 as its largest gain."""
     found = certify_impacts(np.eye(2), [before], [after])
     assert found.gains == (largest > 0.0) and found.largest_gain == largest

@@ -1,4 +1,5 @@
-"""Warnings before a run: each number in closed form, each remedy silences its warning, and what is right gets none."""
+"""Warnings before a run: each number in closed form, each remedy silences its warning, and what is
+right gets none."""
 
 from __future__ import annotations
 
@@ -16,67 +17,171 @@ from iapb.simulation import simulate
 FLOOR = {"name": "floor", "kind": "half_plane", "point": [0, 0], "normal": [0, 1]}
 PLATE = {"name": "plate", "kind": "box", "size": [1.0, 0.05], "center": [0, 0]}
 POST = {"name": "post", "kind": "box", "size": [0.12, 2.0], "center": [0, 0]}
-SIDES = [{"name": name, "kind": "box", "size": [0.2, 2], "center": [x, 0]} for name, x in (("l", -0.13), ("r", 0.13))]
+SIDES = [
+    {"name": name, "kind": "box", "size": [0.2, 2], "center": [x, 0]}
+    for name, x in (("l", -0.13), ("r", 0.13))
+]
 SIDE, MASS = 0.1, 1.0
 ROUGH = ImpulseAugmented(friction_in_impacts=True)
 
 
 def box(i: int = 0, height: float = 0.0, **values: Any) -> dict[str, Any]:
-    return {"name": f"box_{i}", "joint": "planar", "mass": MASS, "inertia": MASS * SIDE**2 / 6.0,
-            "shapes": [{"kind": "box", "size": [SIDE, SIDE]}], "position": [0, 0.5 * SIDE + height, 0], **values}
+    return {
+        "name": f"box_{i}",
+        "joint": "planar",
+        "mass": MASS,
+        "inertia": MASS * SIDE**2 / 6.0,
+        "shapes": [{"kind": "box", "size": [SIDE, SIDE]}],
+        "position": [0, 0.5 * SIDE + height, 0],
+        **values,
+    }
 
 
-def scene(*bodies: dict[str, Any], walls: Any = (FLOOR,), rate: float = 1000.0, duration: float = 0.2,
-          gravity: Any = (0, -9.81), **contact: Any) -> Scene:
-    return Scene.model_validate({
-        "name": "made", "rate": rate, "duration": duration, "gravity": gravity, "bodies": list(bodies),
-        "walls": list(walls), "contact": {"forces": "paper"} | contact})
+def scene(
+    *bodies: dict[str, Any],
+    walls: Any = (FLOOR,),
+    rate: float = 1000.0,
+    duration: float = 0.2,
+    gravity: Any = (0, -9.81),
+    **contact: Any,
+) -> Scene:
+    return Scene.model_validate(
+        {
+            "name": "made",
+            "rate": rate,
+            "duration": duration,
+            "gravity": gravity,
+            "bodies": list(bodies),
+            "walls": list(walls),
+            "contact": {"forces": "paper"} | contact,
+        }
+    )
 
 
 def stack(n: int, **values: Any) -> Scene:
     return scene(*(box(i, SIDE * i) for i in range(n)), **values)
 
 
-# Friction (6), sliding and rocking together: tᵀ(J M⁻¹ Jᵀ)t of two corners with N/2 each is (1/m + h²/I) N.
+# Friction (6), sliding and rocking together: tᵀ(J M⁻¹ Jᵀ)t of two corners with N/2 each is (1/m +
+# h²/I) N.
 SLOWEST = 0.5 * 0.5 * 9.81 * 2.5 * 1e-3
-LANDING = scene(box(height=0.1, velocity=[1.0, 0.0, 0.0]), duration=0.4, stiffness=1e4, friction=0.5, restitution=0.5,
-                friction_velocity=2e-2)
-BALL = SpatialScene.model_validate({
-    "name": "made", "dimensions": 3, "rate": 1000, "duration": 0.2, "integrator": "semi_implicit_euler", "bodies": [
-        {"name": "ball", "joint": "free_flyer", "mass": 0.5, "inertia": [1e-3] * 3, "position": [0, 0, 1, 0, 0, 0, 1],
-         "shapes": [{"kind": "sphere", "radius": 0.05}]}],
-    "walls": [{"name": "floor", "kind": "half_space", "point": [0, 0, 0], "normal": [0, 0, 1]}]})
-DOOR = {"name": "door", "joint": "prismatic", "axis": [0, 1], "mass": 1, "joint_limits": [-0.1, 0.1]}
+LANDING = scene(
+    box(height=0.1, velocity=[1.0, 0.0, 0.0]),
+    duration=0.4,
+    stiffness=1e4,
+    friction=0.5,
+    restitution=0.5,
+    friction_velocity=2e-2,
+)
+BALL = SpatialScene.model_validate(
+    {
+        "name": "made",
+        "dimensions": 3,
+        "rate": 1000,
+        "duration": 0.2,
+        "integrator": "semi_implicit_euler",
+        "bodies": [
+            {
+                "name": "ball",
+                "joint": "free_flyer",
+                "mass": 0.5,
+                "inertia": [1e-3] * 3,
+                "position": [0, 0, 1, 0, 0, 0, 1],
+                "shapes": [{"kind": "sphere", "radius": 0.05}],
+            }
+        ],
+        "walls": [{"name": "floor", "kind": "half_space", "point": [0, 0, 0], "normal": [0, 0, 1]}],
+    }
+)
+DOOR = {
+    "name": "door",
+    "joint": "prismatic",
+    "axis": [0, 1],
+    "mass": 1,
+    "joint_limits": [-0.1, 0.1],
+}
 
-# scene, kinds of warnings in their order, what the last one says, values each of which silences them
+# scene, kinds of warnings in their order, what the last one says, values each of which silences
+# them
 WARNED: dict[str, tuple[Scene, list[str], list[str], list[dict[str, Any]]]] = {
-    "too stiff": (scene(box(height=0.15), stiffness=1e9), ["stiffness"], ["<= 330000", "rate >= 55000 Hz"],
-                  [{"contact.stiffness": 330000.0}, {"rate": 55000.0}]),
-    "too much damping": (scene(box(), stiffness=1e4, damping=2000.0), ["damping"], ["<= 660", "rate >= 3100 Hz"],
-                         [{"contact.damping": 660.0}, {"rate": 3100.0}]),
-    "sag": (stack(5), ["sag"], [f"{1e3 * 5 * MASS * 9.81 / 2000.0:.3g} mm", ">= 2500"],
-            [{"contact.stiffness": 2500.0}]),
-    "sag of a joint": (scene(DOOR, stiffness=100.0), ["sag"], ["by 0.49", ">= 500", "lower limit of door"],
-                       [{"contact.stiffness": 500.0}, {"bodies.door.joint_limits": [-1.0, 1.0]}]),
-    "friction (6)": (scene(box(), stiffness=1e4, friction=0.5), ["friction"],
-                     [f">= {math.ceil(1e4 * SLOWEST) / 1e4:g}"],
-                     [{"contact.friction_velocity": 1.01 * SLOWEST}, {"contact.forces": "implicit"}]),
-    "behind": (scene(box(height=-5.0), stiffness=1e4), ["outside"], ["[0, 5] m"],
-               [{"bodies.box_0.position": [0, 0.05, 0]}]),
-    "inside": (scene(box(height=-0.03), stiffness=1e4), ["overlap"], ["[0, 0.03] m", "9 J"],
-               [{"bodies.box_0.position": [0, 0.0496, 0]}]),
-    "wedged": (scene(box(height=-0.05), walls=SIDES, stiffness=1e4), ["overlap", "overlap", "wedged"], ["40 mm"],
-               [{"walls.l.center": [-0.151, 0.0], "walls.r.center": [0.151, 0.0]}]),
-    "held inside": (scene(box(joint="prismatic", axis=[0, 1], position=[0.0]), walls=[POST], stiffness=1e4),
-                    ["overlap"], ["no joint can move it out"], [{"walls": []}]),
-    "fast": (scene(box(height=0.5, velocity=[0, -100.0, 0]), walls=[PLATE], stiffness=1e4), ["fast"],
-             ["100 m/s", "rate >= 8100 Hz"], [{"bodies.box_0.velocity": [0, -10.0, 0]}, {"rate": 8100.0}]),
-    "implicit in space": (BALL, ["integrator"], ["gain energy with the integrator semi_implicit_euler"],
-                          [{"integrator": "momentum"}, {"contact.forces": "paper"}, {"walls": []}]),
+    "too stiff": (
+        scene(box(height=0.15), stiffness=1e9),
+        ["stiffness"],
+        ["<= 330000", "rate >= 55000 Hz"],
+        [{"contact.stiffness": 330000.0}, {"rate": 55000.0}],
+    ),
+    "too much damping": (
+        scene(box(), stiffness=1e4, damping=2000.0),
+        ["damping"],
+        ["<= 660", "rate >= 3100 Hz"],
+        [{"contact.damping": 660.0}, {"rate": 3100.0}],
+    ),
+    "sag": (
+        stack(5),
+        ["sag"],
+        [f"{1e3 * 5 * MASS * 9.81 / 2000.0:.3g} mm", ">= 2500"],
+        [{"contact.stiffness": 2500.0}],
+    ),
+    "sag of a joint": (
+        scene(DOOR, stiffness=100.0),
+        ["sag"],
+        ["by 0.49", ">= 500", "lower limit of door"],
+        [{"contact.stiffness": 500.0}, {"bodies.door.joint_limits": [-1.0, 1.0]}],
+    ),
+    "friction (6)": (
+        scene(box(), stiffness=1e4, friction=0.5),
+        ["friction"],
+        [f">= {math.ceil(1e4 * SLOWEST) / 1e4:g}"],
+        [{"contact.friction_velocity": 1.01 * SLOWEST}, {"contact.forces": "implicit"}],
+    ),
+    "behind": (
+        scene(box(height=-5.0), stiffness=1e4),
+        ["outside"],
+        ["[0, 5] m"],
+        [{"bodies.box_0.position": [0, 0.05, 0]}],
+    ),
+    "inside": (
+        scene(box(height=-0.03), stiffness=1e4),
+        ["overlap"],
+        ["[0, 0.03] m", "9 J"],
+        [{"bodies.box_0.position": [0, 0.0496, 0]}],
+    ),
+    "wedged": (
+        scene(box(height=-0.05), walls=SIDES, stiffness=1e4),
+        ["overlap", "overlap", "wedged"],
+        ["40 mm"],
+        [{"walls.l.center": [-0.151, 0.0], "walls.r.center": [0.151, 0.0]}],
+    ),
+    "held inside": (
+        scene(box(joint="prismatic", axis=[0, 1], position=[0.0]), walls=[POST], stiffness=1e4),
+        ["overlap"],
+        ["no joint can move it out"],
+        [{"walls": []}],
+    ),
+    "fast": (
+        scene(box(height=0.5, velocity=[0, -100.0, 0]), walls=[PLATE], stiffness=1e4),
+        ["fast"],
+        ["100 m/s", "rate >= 8100 Hz"],
+        [{"bodies.box_0.velocity": [0, -10.0, 0]}, {"rate": 8100.0}],
+    ),
+    "implicit in space": (
+        BALL,
+        ["integrator"],
+        ["gain energy with the integrator semi_implicit_euler"],
+        [{"integrator": "momentum"}, {"contact.forces": "paper"}, {"walls": []}],
+    ),
     "slides as it lands": (
-        LANDING, ["impact friction"], ["1.4 m/s", "slide at 1 m/s"],
-        [{"contact.friction": 0.0}, {"bodies.box_0.velocity": [0.0, 0.0, 0.0]}, {"bodies.box_0.friction": 0.0},
-         {"bodies.box_0.position": [0.0, 0.05, 0.0]}, {"hand": {"body": "box_0"}}]),
+        LANDING,
+        ["impact friction"],
+        ["1.4 m/s", "slide at 1 m/s"],
+        [
+            {"contact.friction": 0.0},
+            {"bodies.box_0.velocity": [0.0, 0.0, 0.0]},
+            {"bodies.box_0.friction": 0.0},
+            {"bodies.box_0.position": [0.0, 0.05, 0.0]},
+            {"hand": {"body": "box_0"}},
+        ],
+    ),
 }
 
 
@@ -90,7 +195,9 @@ def test_each_fault_is_named_with_what_helps_and_that_helps(name: str) -> None:
         assert not check_scene(made.with_values(values)), values
 
 
-@pytest.mark.parametrize("made", [load_scene(find_scene(name)) for name in scene_names()], ids=scene_names())
+@pytest.mark.parametrize(
+    "made", [load_scene(find_scene(name)) for name in scene_names()], ids=scene_names()
+)
 def test_shipped_scenes_get_no_warning(made: Scene) -> None:
     assert not check_scene(made)
 
@@ -108,22 +215,34 @@ def test_friction_in_its_impact_shortens_the_way_of_a_body_that_lands_sliding() 
 
 
 @pytest.mark.parametrize("damping", [0.0, 50.0, 150.0])
-def test_the_step_holds_k_plus_2b_up_to_4_at_the_lightest_mode_of_a_box_on_two_corners(damping: float) -> None:
-    """Rocking: J M⁻¹ Jᵀ of two corners has the eigenvalue 2 a²/I = 3/m, a half a side; k ≤ 1 for what meets."""
-    limits, dt, mobility = step_limits(Start(scene(box(), damping=damping, stiffness=1e4))), 1e-3, 3.0 / MASS
+def test_the_step_holds_k_plus_2b_up_to_4_at_the_lightest_mode_of_a_box_on_two_corners(
+    damping: float,
+) -> None:
+    """Rocking: J M⁻¹ Jᵀ of two corners has the eigenvalue 2 a²/I = 3/m, a half a side; k ≤ 1 for
+    what meets."""
+    limits, dt, mobility = (
+        step_limits(Start(scene(box(), damping=damping, stiffness=1e4))),
+        1e-3,
+        3.0 / MASS,
+    )
     assert limits is not None and limits.mass == pytest.approx(MASS / 3.0)
     expected = min(1.0, 4.0 - 2.0 * damping * mobility * dt) / (mobility * dt**2)
     assert limits.stiffness == pytest.approx(expected, rel=1e-6)
-    assert limits.damping == pytest.approx((4.0 - 1e4 * mobility * dt**2) / (2.0 * mobility * dt), rel=1e-6)
+    assert limits.damping == pytest.approx(
+        (4.0 - 1e4 * mobility * dt**2) / (2.0 * mobility * dt), rel=1e-6
+    )
 
 
 def test_in_a_stack_all_contacts_swing_together() -> None:
-    """Heaving of n boxes on springs 2K: the largest eigenvalue of 2/m tridiag(−1, 2, −1), free end; rocking 3/2."""
+    """Heaving of n boxes on springs 2K: the largest eigenvalue of 2/m tridiag(−1, 2, −1), free end;
+    rocking 3/2."""
     heave = 2.0 / MASS * (2.0 + 2.0 * math.cos(2.0 * math.pi / 11))
     assert Start(stack(5)).critical[0][0] == pytest.approx(3.0 / 2.0 * heave, rel=1e-6)
 
 
-@pytest.mark.parametrize(("damping", "stiffness"), [(0.0, 1e5), (150.0, 1e4), (50.0, 1e4), (0.0, 2e6)])
+@pytest.mark.parametrize(
+    ("damping", "stiffness"), [(0.0, 1e5), (150.0, 1e4), (50.0, 1e4), (0.0, 2e6)]
+)
 def test_at_the_smallest_rate_the_scene_is_at_its_limits(damping: float, stiffness: float) -> None:
     given = scene(box(), damping=damping, stiffness=stiffness)
     limits = step_limits(Start(given))
@@ -134,8 +253,10 @@ def test_at_the_smallest_rate_the_scene_is_at_its_limits(damping: float, stiffne
     assert max(at_a_limit) == pytest.approx(1.0, rel=1e-6)
 
 
-@pytest.mark.parametrize(("moments", "kinds"), [([1e-3, 1e-3, 1e-2], ["inertia"]), ([1e-3, 1e-3, 2e-3], []),
-                                                ([0.0, 1e-3, 1e-3], [])])  # fmt: skip
+@pytest.mark.parametrize(
+    ("moments", "kinds"),
+    [([1e-3, 1e-3, 1e-2], ["inertia"]), ([1e-3, 1e-3, 2e-3], []), ([0.0, 1e-3, 1e-3], [])],
+)
 def test_moments_of_inertia_that_no_body_has_are_named(moments, kinds) -> None:
     body = {"name": "ball", "joint": "revolute", "mass": 0.5, "inertia": moments, "axis": [0, 0, 1]}
     spatial = {"name": "made", "dimensions": 3, "rate": 1000, "duration": 0.1, "bodies": [body]}
@@ -147,7 +268,8 @@ def test_moments_of_inertia_that_no_body_has_are_named(moments, kinds) -> None:
 
 def test_angles_in_degrees_are_named_with_their_place_and_radians_are_not(tmp_path) -> None:
     path = tmp_path / "turned.yaml"
-    path.write_text("""name: turned
+    path.write_text(
+        """name: turned
 rate: 1000
 duration: 0.1
 bodies:
@@ -156,30 +278,54 @@ bodies:
   - {name: arm, joint: revolute, mass: 1, inertia: 0.01, position: [10], joint_limits: [-90, 20]}
 walls:
   - {name: block, kind: box, size: [1, 0.1], center: [0, -1], angle: 7}
-""", encoding="utf-8")
+""",
+        encoding="utf-8",
+    )
     found = [one for one in check_scene(load_scene(path)) if one.kind == "degrees"]
     lines = path.read_text(encoding="utf-8").splitlines()
     assert {one.where: one.text.partition(": ")[0] for one in found} == {
-        name: f"{path}:{line}:{lines[line - 1].index(value) + 1}" for name, line, value in (
-            ("bodies[0].position[2]", 5, "45"), ("bodies[0].shapes[0].angle", 6, "-30"),
-            ("bodies[1].joint_limits[0]", 7, "-90"), ("walls[0].angle", 9, "7}"))}
+        name: f"{path}:{line}:{lines[line - 1].index(value) + 1}"
+        for name, line, value in (
+            ("bodies[0].position[2]", 5, "45"),
+            ("bodies[0].shapes[0].angle", 6, "-30"),
+            ("bodies[1].joint_limits[0]", 7, "-90"),
+            ("walls[0].angle", 9, "7}"),
+        )
+    }
     assert any("set 0.785398" in one.text for one in found)
-    for angle in (1.0, 6.0, -math.tau, math.pi, 7.25, 12.3):  # the last two: a body that has turned before
+    for angle in (
+        1.0,
+        6.0,
+        -math.tau,
+        math.pi,
+        7.25,
+        12.3,
+    ):  # the last two: a body that has turned before
         assert not check_scene(scene(box(position=[0, 1, angle])))
     assert [one.kind for one in check_scene(scene(box(position=[0, 1, 90])))] == ["degrees"]
     solid = box(joint="free_flyer", inertia=[0.1, 0.1, 0.1, 0, 0, 0], rpy=[0, 90, 0], position=[])
-    spatial = {"name": "made", "dimensions": 3, "rate": 1000, "duration": 0.1, "bodies": [
-        solid | {"shapes": [{"kind": "box", "size": [0.1, 0.1, 0.1]}]}]}
-    assert {one.where for one in check_scene(SpatialScene.model_validate(spatial))} == {"bodies[0].rpy[1]"}
+    spatial = {
+        "name": "made",
+        "dimensions": 3,
+        "rate": 1000,
+        "duration": 0.1,
+        "bodies": [solid | {"shapes": [{"kind": "box", "size": [0.1, 0.1, 0.1]}]}],
+    }
+    assert {one.where for one in check_scene(SpatialScene.model_validate(spatial))} == {
+        "bodies[0].rpy[1]"
+    }
 
 
 # What implicit contact chooses
 
 
-@pytest.mark.parametrize(("contact", "stiffness", "damping"), [
-    ({}, 990000.0, 99000.0), ({"stiffness": 2e4}, 2e4, 2000.0)])
+@pytest.mark.parametrize(
+    ("contact", "stiffness", "damping"),
+    [({}, 990000.0, 99000.0), ({"stiffness": 2e4}, 2e4, 2000.0)],
+)
 def test_implicit_contact_holds_ten_times_all_weight_at_a_tenth_of_a_millimetre(
-        contact: dict[str, Any], stiffness: float, damping: float) -> None:
+    contact: dict[str, Any], stiffness: float, damping: float
+) -> None:
     """10 m g over 0.1 mm, rounded up to two digits; an overlap fades in 0.1 s."""
     chosen, (said,) = chosen_scene(scene(box(), forces="implicit", **contact))
     assert (chosen.contact.stiffness, chosen.contact.damping) == (stiffness, damping)

@@ -1,4 +1,5 @@
-"""Distrust: nothing is said of sound runs, and each reason of what is planted in one, or of what passes through."""
+"""Distrust: nothing is said of sound runs, and each reason of what is planted in one, or of what
+passes through."""
 
 from __future__ import annotations
 
@@ -20,17 +21,38 @@ SIDE = 0.1
 CUBE, SQUARE = {"kind": "box", "size": [0.01] * 3}, {"kind": "box", "size": [0.01] * 2}
 
 
-def body(name: str, shape: dict[str, Any], position: list[float], velocity: list[float], mass: float = 0.2) -> Any:
+def body(
+    name: str,
+    shape: dict[str, Any],
+    position: list[float],
+    velocity: list[float],
+    mass: float = 0.2,
+) -> Any:
     flat = len(position) == 2
-    return {"name": name, "joint": "planar" if flat else "free_flyer", "mass": mass,
-            "inertia": 1e-5 if flat else [1e-5, 1e-5, 1e-5], "shapes": [shape],
-            "position": [*position, 0] if flat else [*position, 0, 0, 0, 1],
-            "velocity": [*velocity, *[0.0] * ((3 if flat else 6) - len(velocity))]}
+    return {
+        "name": name,
+        "joint": "planar" if flat else "free_flyer",
+        "mass": mass,
+        "inertia": 1e-5 if flat else [1e-5, 1e-5, 1e-5],
+        "shapes": [shape],
+        "position": [*position, 0] if flat else [*position, 0, 0, 0, 1],
+        "velocity": [*velocity, *[0.0] * ((3 if flat else 6) - len(velocity))],
+    }
 
 
 def run_of(*bodies: Any, walls: Any = (), steps: int = 6, **given: Any) -> Run:
-    kind, more = (Scene, {}) if isinstance(bodies[0]["inertia"], float) else (SpatialScene, {"dimensions": 3})
-    scene = {"name": "made", "rate": 1000.0, "duration": 1.0, "bodies": list(bodies), "walls": list(walls)}
+    kind, more = (
+        (Scene, {})
+        if isinstance(bodies[0]["inertia"], float)
+        else (SpatialScene, {"dimensions": 3})
+    )
+    scene = {
+        "name": "made",
+        "rate": 1000.0,
+        "duration": 1.0,
+        "bodies": list(bodies),
+        "walls": list(walls),
+    }
     return simulate(kind.model_validate(scene | more | given), steps=steps)
 
 
@@ -39,7 +61,9 @@ def fallen(height: float = 0.01, **values: Any) -> Run:
     shape = {"kind": "box", "size": [SIDE, SIDE]}
     crate = body("box", shape, [0, 0.5 * SIDE + height], [], mass=1.0) | {"inertia": SIDE**2 / 6.0}
     floor = {"name": "floor", "kind": "half_plane", "point": [0, 0], "normal": [0, 1]}
-    return run_of(crate, walls=[floor], steps=200, gravity=[0, -9.81], contact={"forces": "paper"} | values)
+    return run_of(
+        crate, walls=[floor], steps=200, gravity=[0, -9.81], contact={"forces": "paper"} | values
+    )
 
 
 def test_a_run_that_gains_energy_says_so_wherever_it_is_shown() -> None:
@@ -54,23 +78,47 @@ def test_each_reason_is_found_in_the_arrays_of_a_sound_run() -> None:
     rising, far, back, lost = np.linspace(0.0, 1.0, 201), *(run.q.copy() for _ in range(3))
     far[-1, 0], back[-1, 0], lost[-1, 0] = 1e3, -1e3, np.nan
     for planted, why in (
-            (replace(run, energy=run.energy | {"kinetic": run.energy["kinetic"] + rising}), "above start"),
-            (replace(run, energy=run.energy | {"friction_work": rising[1:]}), "friction drove"),
-            (replace(run, contacts=replace(run.contacts, gap=run.contacts.gap - 0.51 * SIDE)), "half of 100 mm"),
-            (replace(run, q=far), "can be explained"), (replace(run, q=back), "can be explained"),
-            (replace(run, q=lost), "not finite")):
+        (
+            replace(run, energy=run.energy | {"kinetic": run.energy["kinetic"] + rising}),
+            "above start",
+        ),
+        (replace(run, energy=run.energy | {"friction_work": rising[1:]}), "friction drove"),
+        (
+            replace(run, contacts=replace(run.contacts, gap=run.contacts.gap - 0.51 * SIDE)),
+            "half of 100 mm",
+        ),
+        (replace(run, q=far), "can be explained"),
+        (replace(run, q=back), "can be explained"),
+        (replace(run, q=lost), "not finite"),
+    ):
         assert why in distrust_of(planted)[0]
 
 
 def test_a_joint_beyond_its_limit_is_seen() -> None:
-    door = body("door", SQUARE, [0, 0], []) | {"joint": "prismatic", "axis": [1, 0], "position": [0.0],
-                                               "velocity": [0.0], "joint_limits": [-0.1, 0.1], "inertia": 1.0}
+    door = body("door", SQUARE, [0, 0], []) | {
+        "joint": "prismatic",
+        "axis": [1, 0],
+        "position": [0.0],
+        "velocity": [0.0],
+        "joint_limits": [-0.1, 0.1],
+        "inertia": 1.0,
+    }
     run = run_of(door, steps=20)
-    for beyond, when, seen in ((0.009, -1, True), (0.007, -1, False), (0.101, 5, True), (0.099, 5, False)):
+    for beyond, when, seen in (
+        (0.009, -1, True),
+        (0.007, -1, False),
+        (0.101, 5, True),
+        (0.099, 5, False),
+    ):
         q = run.q.copy()
         q[when, 0] = 0.1 + beyond
-        assert run.distrust == () and any("beyond its limits -0.1 and 0.1" in why for why in distrust_of(
-            replace(run, q=q))) == seen
+        assert (
+            run.distrust == ()
+            and any(
+                "beyond its limits -0.1 and 0.1" in why for why in distrust_of(replace(run, q=q))
+            )
+            == seen
+        )
 
 
 @pytest.fixture(scope="module")
@@ -92,33 +140,50 @@ def faster(run: Run) -> np.ndarray:
 def test_energy_that_a_heavy_neighbour_hides_is_seen(thrown: Run, meet: bool) -> None:
     """If the two touch, one may take energy from the other, but only by forces."""
     table, one = thrown.contacts, np.zeros(int(meet))
-    touching = replace(table, offsets=table.offsets + np.minimum(np.arange(101), len(one)), gap=one,
-                       body_a=one.astype(int), body_b=one.astype(int) + 1)
+    touching = replace(
+        table,
+        offsets=table.offsets + np.minimum(np.arange(101), len(one)),
+        gap=one,
+        body_a=one.astype(int),
+        body_b=one.astype(int) + 1,
+    )
     assert thrown.distrust == distrust_of(replace(thrown, contacts=touching)) == ()
     energy, speed = distrust_of(replace(thrown, contacts=touching, v=faster(thrown)))
     beyond = "start and the work of all forces" if meet else "start and work"
     assert energy.startswith("the energy of ball is") and f"J above {beyond} at 0.1 s" in energy
-    assert speed.startswith("the speed of ball changes by 9.") and speed.endswith("although nothing touches it")
+    assert speed.startswith("the speed of ball changes by 9.") and speed.endswith(
+        "although nothing touches it"
+    )
 
 
 @pytest.mark.parametrize("kind", ["penalty", "friction"])
-def test_contact_forces_that_drive_a_body_which_touches_no_other_are_seen(thrown: Run, kind: str) -> None:
+def test_contact_forces_that_drive_a_body_which_touches_no_other_are_seen(
+    thrown: Run, kind: str
+) -> None:
     """The work of the forces explains the motion, but no other body gave the energy."""
     v, force = faster(thrown), np.zeros_like(thrown.penalty_force)
     force[:, :3] = 0.2 * np.diff(v - thrown.v, axis=0)[:, :3] * 1000.0
     found = distrust_of(replace(thrown, v=v, **{f"{kind}_force": force}))
-    assert found[0].startswith("the energy of ball is") and "above start and work at 0.1 s" in found[0]
-    assert len(found) == (2 if kind == "friction" else 1) and all("friction drove ball" in why for why in found[1:])
+    assert (
+        found[0].startswith("the energy of ball is") and "above start and work at 0.1 s" in found[0]
+    )
+    assert len(found) == (2 if kind == "friction" else 1) and all(
+        "friction drove ball" in why for why in found[1:]
+    )
 
 
 @pytest.mark.parametrize("touched", [False, True])
-def test_a_spin_that_turns_while_nothing_touches_the_body_is_seen(thrown: Run, touched: bool) -> None:
+def test_a_spin_that_turns_while_nothing_touches_the_body_is_seen(
+    thrown: Run, touched: bool
+) -> None:
     v, force = thrown.v.copy(), np.zeros_like(thrown.penalty_force)
     angle = np.linspace(0.0, 0.05, len(v))
     v[:, 3], v[:, 5] = 20.0 * np.sin(angle), 20.0 * np.cos(angle)  # its energy stays
     force[:, 4] = 1e-9 * touched
     found = distrust_of(replace(thrown, v=v, penalty_force=force))
-    assert found == (() if touched else ("the spin of ball changes by 5 % although nothing touches it",))
+    assert found == (
+        () if touched else ("the spin of ball changes by 5 % although nothing touches it",)
+    )
 
 
 def test_a_later_part_of_a_run_is_followed_from_its_second_state_on(thrown: Run) -> None:
@@ -129,7 +194,15 @@ def test_a_later_part_of_a_run_is_followed_from_its_second_state_on(thrown: Run)
 
 
 def plate(*size: float, center: Any = None, **values: Any) -> list[dict[str, Any]]:
-    return [{"name": "plate", "kind": "box", "size": size, "center": center or [0] * len(size), **values}]
+    return [
+        {
+            "name": "plate",
+            "kind": "box",
+            "size": size,
+            "center": center or [0] * len(size),
+            **values,
+        }
+    ]
 
 
 UP, HIGH, DOWN = [0, 0.1], [0, 0.105], [0, -30.0]
@@ -137,42 +210,91 @@ PASSAGES: dict[str, tuple[list[Any], list[Any], str]] = {
     "box, plate": ([body("a", SQUARE, HIGH, DOWN)], plate(0.2, 0.01), "a passes through plate"),
     "beside it": ([body("a", SQUARE, UP, DOWN)], plate(0.2, 0.01, center=[0.106, 0]), ""),
     "past its corner": ([body("a", DISC, [0.156, 0.041], [-31.0, -31.0])], plate(0.2, 0.01), ""),
-    "box, plate in space": ([body("a", CUBE, [0, 0, 0.105], [0, 0, -30.0])], plate(0.2, 0.2, 0.01),
-                            "a passes through plate"),
+    "box, plate in space": (
+        [body("a", CUBE, [0, 0, 0.105], [0, 0, -30.0])],
+        plate(0.2, 0.2, 0.01),
+        "a passes through plate",
+    ),
     "polygon, polygon": (
         [body("a", {"kind": "polygon", "vertices": [[0, 0], [0.01, 0], [0, 0.01]]}, UP, DOWN)],
-        [{"name": "plate", "kind": "polygon", "vertices": [[-0.1, -0.005], [0.1, -0.005], [0, 0.005]]}],
-        "a passes through plate"),
-    "ends of two plates": ([body("a", {"kind": "box", "size": [0.1, 0.01]}, HIGH, DOWN)],
-                           plate(0.1, 0.01, center=[0.09, 0]), "a passes through plate"),
-    "box, round post": ([body("a", {"kind": "box", "size": [0.02, 0.02]}, [0.004, 0.1], [0, -60.0])],
-                        [{"name": "post", "kind": "circle", "radius": 0.004}], "a passes through post"),
-    "box, ball that stands": ([body("a", CUBE, [0.002, 0.002, 0.1], [0, 0, -40.0])],
-                              [{"name": "knob", "kind": "sphere", "radius": 0.004}], "a passes through knob"),
-    "disc, moving plate": ([body("a", DISC, UP, [0, -21.0]),
-                            body("b", {"kind": "box", "size": [0.2, 0.004]}, [0, -0.1], [0, 22.0])], [],
-                           "a passes through b"),
-    "balls": ([body("a", BALL, [-0.1, 0, 0], [30, 0, 0]), body("b", BALL, [0.1, 0.004, 0], [-30, 0, 0])], [],
-              "a passes through b"),
-    "balls that miss": ([body("a", BALL, [-0.1, 0, 0], [30, 0, 0]), body("b", BALL, [0.1, 0.0101, 0], [-30, 0, 0])],
-                        [], ""),
-    "turning plate that misses": ([body("a", {"kind": "box", "size": [0.2, 0.004]}, [0, 0], [0, 0, 900.0]),
-                                   body("b", DISC, [0, 0.106], [1.0, 0])], [], ""),
+        [
+            {
+                "name": "plate",
+                "kind": "polygon",
+                "vertices": [[-0.1, -0.005], [0.1, -0.005], [0, 0.005]],
+            }
+        ],
+        "a passes through plate",
+    ),
+    "ends of two plates": (
+        [body("a", {"kind": "box", "size": [0.1, 0.01]}, HIGH, DOWN)],
+        plate(0.1, 0.01, center=[0.09, 0]),
+        "a passes through plate",
+    ),
+    "box, round post": (
+        [body("a", {"kind": "box", "size": [0.02, 0.02]}, [0.004, 0.1], [0, -60.0])],
+        [{"name": "post", "kind": "circle", "radius": 0.004}],
+        "a passes through post",
+    ),
+    "box, ball that stands": (
+        [body("a", CUBE, [0.002, 0.002, 0.1], [0, 0, -40.0])],
+        [{"name": "knob", "kind": "sphere", "radius": 0.004}],
+        "a passes through knob",
+    ),
+    "disc, moving plate": (
+        [
+            body("a", DISC, UP, [0, -21.0]),
+            body("b", {"kind": "box", "size": [0.2, 0.004]}, [0, -0.1], [0, 22.0]),
+        ],
+        [],
+        "a passes through b",
+    ),
+    "balls": (
+        [body("a", BALL, [-0.1, 0, 0], [30, 0, 0]), body("b", BALL, [0.1, 0.004, 0], [-30, 0, 0])],
+        [],
+        "a passes through b",
+    ),
+    "balls that miss": (
+        [body("a", BALL, [-0.1, 0, 0], [30, 0, 0]), body("b", BALL, [0.1, 0.0101, 0], [-30, 0, 0])],
+        [],
+        "",
+    ),
+    "turning plate that misses": (
+        [
+            body("a", {"kind": "box", "size": [0.2, 0.004]}, [0, 0], [0, 0, 900.0]),
+            body("b", DISC, [0, 0.106], [1.0, 0]),
+        ],
+        [],
+        "",
+    ),
 }
 
 
-for turned in (0.0, 0.5, -2.0):  # a ball 10 mm beside its body, 40 mm in a step, through a plate or past its end
+for turned in (
+    0.0,
+    0.5,
+    -2.0,
+):  # a ball 10 mm beside its body, 40 mm in a step, through a plate or past its end
     c, s = math.cos(turned), math.sin(turned)
-    for kind, form in (("box", {"size": [0.2, 0.004]}), ("polygon", {
-            "vertices": [[-0.1, -0.002], [0.1, -0.002], [0.1, 0.002], [-0.1, 0.002]]})):
+    for kind, form in (
+        ("box", {"size": [0.2, 0.004]}),
+        ("polygon", {"vertices": [[-0.1, -0.002], [0.1, -0.002], [0.1, 0.002], [-0.1, 0.002]]}),
+    ):
         for along, said in ((0.05, "ball passes through plate in the step to 0.003 s"), (0.12, "")):
             start = [0.3 + c * along - s * 0.1 - 0.01, 0.2 + s * along + c * 0.1]
             PASSAGES[f"ball, {kind} turned by {turned}, {along} from its middle"] = (
                 [body("ball", DISC | {"center": [0.01, 0]}, start, [40.0 * s, -40.0 * c])],
-                [{"name": "plate", "kind": kind, "center": [0.3, 0.2], "angle": turned, **form}], said)
+                [{"name": "plate", "kind": kind, "center": [0.3, 0.2], "angle": turned, **form}],
+                said,
+            )
 PASSAGES["upside down in space"] = (
-    [body("ball", BALL | {"center": [0, 0, 0.03]}, [0, 0, 0], [0, 0, 40.0]) | {"position": [0, 0, 0.13, 1, 0, 0, 0]}],
-    plate(0.2, 0.2, 0.004, rpy=[0.2, 0.1, 0.3]), "ball passes through plate")
+    [
+        body("ball", BALL | {"center": [0, 0, 0.03]}, [0, 0, 0], [0, 0, 40.0])
+        | {"position": [0, 0, 0.13, 1, 0, 0, 0]}
+    ],
+    plate(0.2, 0.2, 0.004, rpy=[0.2, 0.1, 0.3]),
+    "ball passes through plate",
+)
 
 
 @pytest.mark.parametrize("name", PASSAGES)
@@ -187,25 +309,49 @@ def test_a_wall_that_is_wholly_inside_a_body_is_seen() -> None:
     block = body("block", {"kind": "box", "size": [0.1, 0.1]}, [0, 0.0465], [])
     (found,) = run_of(block, walls=[post], steps=1).distrust
     assert found == "block and a wall overlap by 5.5 mm at 0 s, all of 4 mm"
-    assert run_of(body("block", block["shapes"][0], [0, 0.0485], []), walls=[post], steps=1).distrust == ()
+    assert (
+        run_of(body("block", block["shapes"][0], [0, 0.0485], []), walls=[post], steps=1).distrust
+        == ()
+    )
 
 
-@pytest.mark.parametrize(("shape", "wide", "friction", "said"), [
-    ({"kind": "circle", "radius": 0.035}, 0.06, 0.0, "10 mm narrower"),
-    ({"kind": "circle", "radius": 0.0301}, 0.06, 0.0, ""),
-    ({"kind": "box", "size": [SIDE, SIDE]}, 0.06, 0.0, "40 mm narrower"),
-    ({"kind": "box", "size": [SIDE, SIDE]}, 0.06, 0.5, ""),  # friction holds it there
-    ({"kind": "box", "size": [SIDE, SIDE]}, 0.095, 0.0, ""),
-    ({"kind": "box", "size": [SIDE, SIDE]}, 0.11, 0.0, ""),
-])
+@pytest.mark.parametrize(
+    ("shape", "wide", "friction", "said"),
+    [
+        ({"kind": "circle", "radius": 0.035}, 0.06, 0.0, "10 mm narrower"),
+        ({"kind": "circle", "radius": 0.0301}, 0.06, 0.0, ""),
+        ({"kind": "box", "size": [SIDE, SIDE]}, 0.06, 0.0, "40 mm narrower"),
+        ({"kind": "box", "size": [SIDE, SIDE]}, 0.06, 0.5, ""),  # friction holds it there
+        ({"kind": "box", "size": [SIDE, SIDE]}, 0.095, 0.0, ""),
+        ({"kind": "box", "size": [SIDE, SIDE]}, 0.11, 0.0, ""),
+    ],
+)
 def test_what_falls_through_a_gap_too_narrow_for_it_is_seen(
-        shape: dict[str, Any], wide: float, friction: float, said: str) -> None:
-    walls = [{"name": name, "kind": "box", "size": [0.5, 1.0], "center": [side * (0.25 + 0.5 * wide), 0.0]}
-             for name, side in (("left", -1.0), ("right", 1.0))]
+    shape: dict[str, Any], wide: float, friction: float, said: str
+) -> None:
+    walls = [
+        {
+            "name": name,
+            "kind": "box",
+            "size": [0.5, 1.0],
+            "center": [side * (0.25 + 0.5 * wide), 0.0],
+        }
+        for name, side in (("left", -1.0), ("right", 1.0))
+    ]
     thing = body("thing", shape, [0, 0], [], mass=1.0) | {"inertia": SIDE**2 / 6.0}
-    run = run_of(thing, walls=walls, steps=500, gravity=[0, -9.81],
-                 contact={"forces": "paper", "stiffness": 1e4, "damping": 50.0, "friction": friction,
-                           "friction_velocity": 0.3})
+    run = run_of(
+        thing,
+        walls=walls,
+        steps=500,
+        gravity=[0, -9.81],
+        contact={
+            "forces": "paper",
+            "stiffness": 1e4,
+            "damping": 50.0,
+            "friction": friction,
+            "friction_velocity": 0.3,
+        },
+    )
     assert (run.q[-1, 1] < -SIDE) == (friction == 0.0)
     assert [why for why in run.distrust if "narrower" in why and said not in why] == []
     assert any("narrower" in why for why in run.distrust) == bool(said)

@@ -49,26 +49,44 @@ print(json.dumps({name: calls_of_steps(*case) for name, case in cases.items()}))
 """
 
 # One step from the floor, fast enough to reach it in the next one, and sliding.
-NEAR = {"bodies.peg.position": [0.05, -0.0062, 0.0], "bodies.peg.velocity": [0.1, 0.5, 0.0], "contact.friction": 0.3}
+NEAR = {
+    "bodies.peg.position": [0.05, -0.0062, 0.0],
+    "bodies.peg.velocity": [0.1, 0.5, 0.0],
+    "contact.friction": 0.3,
+}
 FULL = {
-    **NEAR, "gravity": [0.0, 1.0], "device.position_resolution": [1e-5, 1e-5, 1e-5], "device.damping": [1, 1, 1],
-    "device.force_limit": [300, 300, 300], "contact.cluster_distance": 1e-4, "contact.coherence_distance": 1e-2,
+    **NEAR,
+    "gravity": [0.0, 1.0],
+    "device.position_resolution": [1e-5, 1e-5, 1e-5],
+    "device.damping": [1, 1, 1],
+    "device.force_limit": [300, 300, 300],
+    "contact.cluster_distance": 1e-4,
+    "contact.coherence_distance": 1e-2,
 }
 IAPB, SPREAD, PENALTY = ("impulses", {}), ("impulses", {"rendering": "spread"}), ("penalty", {})
 RUBBING = ("impulses", {"friction_in_impacts": True})
 
 
 def peg(law=SPREAD, coupling="four-channel", **values):
-    return ("peg_corner", {**FULL, **{name.replace("__", "."): value for name, value in values.items()}}, law, coupling)
+    return (
+        "peg_corner",
+        {**FULL, **{name.replace("__", "."): value for name, value in values.items()}},
+        law,
+        coupling,
+    )
 
 
-ONE_LINK = {"bodies": [{"name": "upper", "joint": "revolute", "mass": 1, "center_of_mass": [0.25, 0]}]}
+ONE_LINK = {
+    "bodies": [{"name": "upper", "joint": "revolute", "mass": 1, "center_of_mass": [0.25, 0]}]
+}
 CASES = {
     "everything": peg(),
     "no gravity": peg(gravity=None),
     "no friction": peg(contact__friction=0),
     "no clustering": peg(contact__cluster_distance=0),
-    "tilted": peg(law=PENALTY, contact__cluster_distance=0, bodies__peg__position=[0.05, -0.0072, 0.05]),
+    "tilted": peg(
+        law=PENALTY, contact__cluster_distance=0, bodies__peg__position=[0.05, -0.0072, 0.05]
+    ),
     "no filter": peg(contact__cluster_distance=0, contact__coherence_distance=0),
     "no walls": peg(walls=[]),
     "no impulses": peg(law=PENALTY),
@@ -92,23 +110,36 @@ CASES = {
 
 # effect -> kernels that it alone enters
 ONLY = {
-    "gravity": "gravity", "friction": "friction_share", "clustering": "cluster",
+    "gravity": "gravity",
+    "friction": "friction_share",
+    "clustering": "cluster",
     "coherence": "same_surface squared_distance",
     "wall_contacts": "find_contacts detect contact_velocities resting_force",
     "impulses": "resolve_collisions find_islands resolve_island factored_impact",
     "unequal_restitution": "resolve_unequal poisson_impact pair_restitution",
-    "impact_friction": "add_friction_to_impact add_impact_friction", "device_limits": "largest_share",
-    "coupling": "measure coordinate command", "quantisation": "sense",
-    "hand_force": "press", "joint_damping": "damp_joints", "joint_limits": "add_stops",
-    "varying_inertia": "mass_matrix cholesky_tree_blocks", "velocity_terms": "bias",
+    "impact_friction": "add_friction_to_impact add_impact_friction",
+    "device_limits": "largest_share",
+    "coupling": "measure coordinate command",
+    "quantisation": "sense",
+    "hand_force": "press",
+    "joint_damping": "damp_joints",
+    "joint_limits": "add_stops",
+    "varying_inertia": "mass_matrix cholesky_tree_blocks",
+    "velocity_terms": "bias",
 }
 
 
 @pytest.fixture(scope="module")
 def found():
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
-    done = subprocess.run([sys.executable, "-c", COUNTER], input=json.dumps(CASES), env=environment, text=True,
-                          capture_output=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", COUNTER],
+        input=json.dumps(CASES),
+        env=environment,
+        text=True,
+        capture_output=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 
@@ -128,9 +159,17 @@ def test_the_unilateral_coupler_is_entered_by_its_own_world_only(found):
 
 
 def test_mass_matrices_are_made_and_factored_as_often_as_they_vary(found):
-    """A constant one before the first step and never again; one stage, one matrix, and one more of the device."""
+    """A constant one before the first step and never again; one stage, one matrix, and one more of
+    the device."""
     for case in CASES:
         counted = found[case]["counted"]
-        made = sum(number for name, number in counted.items() if name == "mass_matrix" or name.startswith("cholesky"))
+        made = sum(
+            number
+            for name, number in counted.items()
+            if name == "mass_matrix" or name.startswith("cholesky")
+        )
         assert (made == 0) == ("varying_inertia" not in found[case]["on"]), case
-    assert [found[case]["counted"]["mass_matrix"] for case in ("pendulum", "arm with device")] == [6, 12]
+    assert [found[case]["counted"]["mass_matrix"] for case in ("pendulum", "arm with device")] == [
+        6,
+        12,
+    ]

@@ -16,13 +16,21 @@ from iapb.scene.model import scene_kind
 from iapb.system import System
 
 Floats = NDArray[np.float64]
-ALIGNED, TOUCHING = 0.85, 1e-12  # cosine of the normals of one surface; overlap [m] that still counts as touching
+ALIGNED, TOUCHING = (
+    0.85,
+    1e-12,
+)  # cosine of the normals of one surface; overlap [m] that still counts as touching
 
 
 def scene_of(bodies: list[dict[str, Any]], walls: list[dict[str, Any]], **values: Any) -> Scene:
-    """Return the scene of these bodies and walls; 1 kHz and 0.1 s unless told; in space if a body is a free flyer."""
+    """Return the scene of these bodies and walls; 1 kHz and 0.1 s unless told; in space if a body
+    is a free flyer."""
     space = {"dimensions": 3} if any(body["joint"] == "free_flyer" for body in bodies) else {}
-    given = {"name": "made", "rate": 1000.0, "duration": 0.1, "bodies": bodies, "walls": walls} | space | values
+    given = (
+        {"name": "made", "rate": 1000.0, "duration": 0.1, "bodies": bodies, "walls": walls}
+        | space
+        | values
+    )
     return scene_kind(given).model_validate(given)
 
 
@@ -31,32 +39,44 @@ def in_space(scene: Scene) -> bool:
     return hasattr(scene.bodies[0], "rpy")
 
 
-# --- the law of impacts ----------------------------------------------------------------------------------------------
+# --- the law of impacts
+# ----------------------------------------------------------------------------------------------
 
 
 def impact(M: Floats, J: Floats, v: Floats, e: float) -> tuple[Floats, Floats]:
     """(20)-(21): v⁺ and the impulses of least norm."""
     size = np.linalg.norm(J, axis=1)
     A = J / np.where(size > 0.0, size, 1.0)[:, None]
-    momentum = -(1.0 + e) * A.T @ np.linalg.pinv(A @ np.linalg.solve(M, A.T), rcond=1e-12, hermitian=True) @ A @ v
+    momentum = (
+        -(1.0 + e)
+        * A.T
+        @ np.linalg.pinv(A @ np.linalg.solve(M, A.T), rcond=1e-12, hermitian=True)
+        @ A
+        @ v
+    )
     return v + np.linalg.solve(M, momentum), np.linalg.pinv(J.T, rcond=1e-10) @ momentum
 
 
 def breach_of_coulomb(T: Floats, p_t: Floats, limit: Floats, v_plus: Floats) -> float:
-    """Largest speed by which T_i v⁺ is not what Coulomb's law leaves: 0 within the limit, against p_t on it."""
+    """Largest speed by which T_i v⁺ is not what Coulomb's law leaves: 0 within the limit, against
+    p_t on it."""
     worst = 0.0
     for rows, own, most in zip(T, p_t, limit, strict=True):
         w, length = rows @ v_plus, float(np.linalg.norm(own))
         slides = length >= most * (1.0 - 1e-7) and length > 0.0
-        worst = max(worst, float(np.linalg.norm(w + slides * np.linalg.norm(w) * own / max(length, 1e-300))))
+        worst = max(
+            worst, float(np.linalg.norm(w + slides * np.linalg.norm(w) * own / max(length, 1e-300)))
+        )
     return worst
 
 
-# --- the contact set of a step (section III) -------------------------------------------------------------------------
+# --- the contact set of a step (section III)
+# -------------------------------------------------------------------------
 
 
 class Contact(NamedTuple):
-    """A contact of a step; `name`: its two shapes and its feature; `stop`: ± arm and dof of the end of a joint."""
+    """A contact of a step; `name`: its two shapes and its feature; `stop`: ± arm and dof of the end
+    of a joint."""
 
     name: tuple[int, int, int]
     bodies: tuple[int, int]
@@ -69,15 +89,26 @@ class Contact(NamedTuple):
 def contacts_of(system: System, q: Floats) -> list[Contact]:
     """Touching shapes, clustered, then the ends of the joints' ranges that are passed."""
     found = system.contacts_at(q)
-    columns = zip(found.shape_a, found.shape_b, found.feature, found.body_a, found.body_b, strict=True)
-    touching = [Contact((int(a), int(b), int(f)), (int(i), int(j)), found.point[k], found.normal[k], found.gap[k])
-                for k, (a, b, f, i, j) in enumerate(columns)]
+    columns = zip(
+        found.shape_a, found.shape_b, found.feature, found.body_a, found.body_b, strict=True
+    )
+    touching = [
+        Contact(
+            (int(a), int(b), int(f)),
+            (int(i), int(j)),
+            found.point[k],
+            found.normal[k],
+            found.gap[k],
+        )
+        for k, (a, b, f, i, j) in enumerate(columns)
+    ]
     kept = clustered(touching, system.scene.contact.cluster_distance)
     return kept + [stop for stop in stops(system, q) if stop.gap <= 0.0]
 
 
 def stops(system: System, q: Floats) -> list[Contact]:
-    """Both ends of each range: gap = ± r (q − bound), r the radius of gyration of all that a revolute joint carries."""
+    """Both ends of each range: gap = ± r (q − bound), r the radius of gyration of all that a
+    revolute joint carries."""
     m, found = system.mechanism, []
     names = ["world", *(body.name for body in system.scene.bodies)]
     parents = [names.index(body.parent) - 1 for body in system.scene.bodies]
@@ -90,31 +121,48 @@ def stops(system: System, q: Floats) -> list[Contact]:
             while ancestor >= 0 and ancestor != b:
                 ancestor = parents[ancestor]
             carried += each.mass * (ancestor == b)
-        arm = np.sqrt(m.mass_matrix(system.start[0])[dof, dof] / carried) if body.joint == "revolute" else 1.0
+        arm = (
+            np.sqrt(m.mass_matrix(system.start[0])[dof, dof] / carried)
+            if body.joint == "revolute"
+            else 1.0
+        )
         for sign, bound in zip((1.0, -1.0), body.joint_limits, strict=True):
             gap, number = sign * arm * (q[m.arrays.q_start[b]] - bound), 10**6 + len(found)
             nowhere = np.zeros(3)  # what counts is the row ± r e_k
-            found.append(Contact((number, number, 0), (b, parents[b]), nowhere, nowhere, gap, (sign * arm, dof)))
+            found.append(
+                Contact(
+                    (number, number, 0), (b, parents[b]), nowhere, nowhere, gap, (sign * arm, dof)
+                )
+            )
     return found
 
 
 def one_surface(c: Contact, d: Contact) -> bool:
     """The same two bodies, in either order, and normals at most 31.8 degrees apart."""
     aligned = float(c.normal @ d.normal)
-    return aligned >= ALIGNED if c.bodies == d.bodies else c.bodies == d.bodies[::-1] and -aligned >= ALIGNED
+    return (
+        aligned >= ALIGNED
+        if c.bodies == d.bodies
+        else c.bodies == d.bodies[::-1] and -aligned >= ALIGNED
+    )
 
 
 def clustered(contacts: list[Contact], distance: float) -> list[Contact]:
-    """Deepest first, what is nearer than the distance to a kept one of its surface goes; the order stays."""
+    """Deepest first, what is nearer than the distance to a kept one of its surface goes; the order
+    stays."""
     kept: list[Contact] = []
     for c in sorted(contacts, key=lambda c: c.gap):
-        if not any(one_surface(c, d) and np.linalg.norm(c.point - d.point) < distance for d in kept):
+        if not any(
+            one_surface(c, d) and np.linalg.norm(c.point - d.point) < distance for d in kept
+        ):
             kept.append(c)
     return [c for c in contacts if any(c is d for d in kept)]
 
 
 def is_new(c: Contact, before: list[Contact], distance: float) -> bool:
-    """No contact that overlapped in the step before has its name, or its surface and a place within the distance."""
+    """No contact that overlapped in the step before has its name, or its surface and a place within
+    the distance."""
+
     def same(d: Contact) -> bool:
         near = distance > 0.0 and c.stop is d.stop is None and one_surface(c, d)
         return d.name == c.name or near and np.linalg.norm(c.point - d.point) <= distance
@@ -129,7 +177,8 @@ def tree_of(mechanism: Mechanism, body: int) -> int:
 
 
 def linked(mechanism: Mechanism, contacts: list[Contact]) -> Any:
-    """For each tree the first of those that the contacts connect it to; the static world connects nothing."""
+    """For each tree the first of those that the contacts connect it to; the static world connects
+    nothing."""
     group = np.arange(len(mechanism.tree_dofs))
     for c in contacts:
         a, b = (tree_of(mechanism, body) for body in c.bodies)
@@ -139,14 +188,19 @@ def linked(mechanism: Mechanism, contacts: list[Contact]) -> Any:
 
 
 def own_values(scene: Scene, c: Contact) -> tuple[float, float]:
-    """(e, μ) of a contact: the smaller e, the geometric mean of μ; what only one gives counts, else the scene's."""
+    """(e, μ) of a contact: the smaller e, the geometric mean of μ; what only one gives counts, else
+    the scene's."""
     if c.stop is not None:
         return scene.contact.restitution, 0.0
     owners = [body for body in scene.bodies for _ in body.shapes] + list(scene.walls)
-    e, mu = ([value for k in c.name[:2] if (value := getattr(owners[k], field)) is not None]
-             for field in ("restitution", "friction"))
-    return (min(e, default=scene.contact.restitution),
-            float(np.prod(mu)) ** (1.0 / len(mu)) if mu else scene.contact.friction)
+    e, mu = (
+        [value for k in c.name[:2] if (value := getattr(owners[k], field)) is not None]
+        for field in ("restitution", "friction")
+    )
+    return (
+        min(e, default=scene.contact.restitution),
+        float(np.prod(mu)) ** (1.0 / len(mu)) if mu else scene.contact.friction,
+    )
 
 
 def tangents_of(n: Floats, space: bool) -> Floats:

@@ -1,4 +1,5 @@
-"""Contacts of shapes against those of the reference; bits that units, order and place must not change."""
+"""Contacts of shapes against those of the reference; bits that units, order and place must not
+change."""
 
 from __future__ import annotations
 
@@ -31,57 +32,94 @@ def random_shape(rng: np.random.Generator, space: bool, kind: str) -> Values:
     count = int(rng.integers(3, 7))
     angles = 2.0 * np.pi * (np.arange(count) + rng.uniform(0.0, 0.7, count)) / count
     reach = rng.uniform(0.2, 0.6, 2)
-    return shape | turn | {"vertices": (reach * np.column_stack([np.cos(angles), np.sin(angles)])).tolist()}
+    return (
+        shape
+        | turn
+        | {"vertices": (reach * np.column_stack([np.cos(angles), np.sin(angles)])).tolist()}
+    )
 
 
 def crowd(space: bool, seed: int, scale: float = 1.0) -> Scene:
     """Six bodies, one of them with two shapes; a plane, and a static shape of each kind."""
-    rng, kinds = np.random.default_rng(seed), ("sphere", "box") if space else ("circle", "box", "polygon")
-    free = {"joint": "free_flyer", "inertia": [1, 1, 1]} if space else {"joint": "planar", "inertia": 1}
+    rng, kinds = (
+        np.random.default_rng(seed),
+        ("sphere", "box") if space else ("circle", "box", "polygon"),
+    )
+    free = (
+        {"joint": "free_flyer", "inertia": [1, 1, 1]}
+        if space
+        else {"joint": "planar", "inertia": 1}
+    )
     shapes = [[random_shape(rng, space, kinds[k % len(kinds)])] for k in range(6)]
     shapes[2].append(random_shape(rng, space, kinds[1]))
     normal = rng.normal(size=3 if space else 2)
-    walls = [{"kind": "half_space" if space else "half_plane", "point": rng.uniform(-0.5, 0.5, len(normal)).tolist(),
-              "normal": normal.tolist()}, *(random_shape(rng, space, kind) for kind in kinds)]
+    walls = [
+        {
+            "kind": "half_space" if space else "half_plane",
+            "point": rng.uniform(-0.5, 0.5, len(normal)).tolist(),
+            "normal": normal.tolist(),
+        },
+        *(random_shape(rng, space, kind) for kind in kinds),
+    ]
     for shape in [*(shape for each in shapes for shape in each), *walls]:
         for length in {"center", "radius", "size", "vertices", "point"} & set(shape):
             shape[length] = (scale * np.array(shape[length])).tolist()
-    return scene_of([{"name": f"b{k}", "mass": 1.0, "shapes": each} | free for k, each in enumerate(shapes)],
-                    [{"name": f"w{k}"} | wall for k, wall in enumerate(walls)])
+    return scene_of(
+        [{"name": f"b{k}", "mass": 1.0, "shapes": each} | free for k, each in enumerate(shapes)],
+        [{"name": f"w{k}"} | wall for k, wall in enumerate(walls)],
+    )
 
 
 def thrown(system: System, seed: int, spread: float = 0.5) -> np.ndarray:
     """A random configuration about the origin."""
     m = system.mechanism
     size = m.nv // 6
-    step = [spread] * (size // 2) + [1.5] * (size - size // 2) if size == 6 else [spread, spread, 3.0]
-    return m.integrate(m.neutral(), np.random.default_rng(seed).uniform(-1.0, 1.0, m.nv) * np.tile(step, 6))
+    step = (
+        [spread] * (size // 2) + [1.5] * (size - size // 2) if size == 6 else [spread, spread, 3.0]
+    )
+    return m.integrate(
+        m.neutral(), np.random.default_rng(seed).uniform(-1.0, 1.0, m.nv) * np.tile(step, 6)
+    )
 
 
 def names_of(found: Any) -> list[tuple[int, int, int]]:
-    return list(zip(found.shape_a.tolist(), found.shape_b.tolist(), found.feature.tolist(), strict=True))
+    return list(
+        zip(found.shape_a.tolist(), found.shape_b.tolist(), found.feature.tolist(), strict=True)
+    )
 
 
 @SPACES
 @pytest.mark.parametrize("margin", [0.0, 0.2, 3.0])
 def test_contacts_of_a_crowd_are_those_of_the_reference(space: bool, margin: float) -> None:
-    """Every pair of kinds: number, order of the two, place, normal and gap; bodies and names of the contact."""
+    """Every pair of kinds: number, order of the two, place, normal and gap; bodies and names of the
+    contact."""
     counts = set()
     for seed in range(30):
         system = System(crowd(space, seed))
         q = thrown(system, seed, 0.5 + 0.5 * (margin > 1.0))
         axes, places = system.mechanism.placements(q)
-        frames = np.append(axes, [np.eye(3)], 0), np.append(places, np.zeros((1, 3)), 0)  # the world's last
+        frames = (
+            np.append(axes, [np.eye(3)], 0),
+            np.append(places, np.zeros((1, 3)), 0),
+        )  # the world's last
         found = system.contacts_at(q, margin)
         expected = find_contacts(system.shapes, system.pairs, *frames, margin)
         pairs, theirs = ([name[:2] for name in names_of(each)] for each in (found, expected))
-        assert sorted(pairs) == sorted(theirs) and len(set(names_of(found))) == len(pairs)  # each has a name of its own
+        assert sorted(pairs) == sorted(theirs) and len(set(names_of(found))) == len(
+            pairs
+        )  # each has a name of its own
         for pair in set(pairs):
-            rows, page = (np.column_stack([each.point, each.normal, each.gap, each.body_a, each.body_b])[
-                [name[:2] == pair for name in names_of(each)]] for each in (found, expected))
+            rows, page = (
+                np.column_stack([each.point, each.normal, each.gap, each.body_a, each.body_b])[
+                    [name[:2] == pair for name in names_of(each)]
+                ]
+                for each in (found, expected)
+            )
             counts.add(len(rows))
             apart = np.abs(rows[:, None] - page).max(axis=2)
-            ties = int(len(rows) == 4)  # which corner of a large overlap stays may tie, and rounding decides
+            ties = int(
+                len(rows) == 4
+            )  # which corner of a large overlap stays may tie, and rounding decides
             assert all(np.sum(apart.min(axis=axis) >= 1e-10) <= ties for axis in (0, 1)), pair
         assert space or not (found.point[:, 2].any() or found.normal[:, 2].any())
     assert counts >= ({1, 3, 4, 8} if space and margin > 1.0 else {1, 2})
@@ -89,14 +127,21 @@ def test_contacts_of_a_crowd_are_those_of_the_reference(space: bool, margin: flo
 
 @SPACES
 def test_names_last_while_bodies_move_a_little(space: bool) -> None:
-    """Else every step of what slides or rolls would be a new contact. Which four of more corners stay may tie."""
+    """Else every step of what slides or rolls would be a new contact. Which four of more corners
+    stay may tie."""
     for seed in range(20):
         system = System(crowd(space, seed))
         q = thrown(system, seed)
-        moved = system.mechanism.integrate(q, np.random.default_rng(seed).normal(size=system.mechanism.nv), 1e-10)
+        moved = system.mechanism.integrate(
+            q, np.random.default_rng(seed).normal(size=system.mechanism.nv), 1e-10
+        )
         before, after = (Counter(names_of(system.contacts_at(place))) for place in (q, moved))
-        many = {pair for pair, number in Counter(name[:2] for name in before).items() if number == 4}
-        assert {name for name in before if name[:2] not in many} == {name for name in after if name[:2] not in many}
+        many = {
+            pair for pair, number in Counter(name[:2] for name in before).items() if number == 4
+        }
+        assert {name for name in before if name[:2] not in many} == {
+            name for name in after if name[:2] not in many
+        }
 
 
 @SPACES
@@ -115,28 +160,41 @@ def test_the_unit_of_length_changes_no_bit(space: bool, factor: float) -> None:
             np.testing.assert_array_equal(getattr(other, name), unit * getattr(one, name))
 
 
-# (shape of a, shape of b or wall, place of a, gap, contacts): all numbers are binary, so that the gap is exact.
+# (shape of a, shape of b or wall, place of a, gap, contacts): all numbers are binary, so that the
+# gap is exact.
 DISC, BRICK = {"kind": "circle", "radius": 0.5}, {"kind": "box", "size": [1, 1]}
 BALL, CUBE = {"kind": "sphere", "radius": 0.5}, {"kind": "box", "size": [1, 1, 1]}
 GROUND = {"kind": "half_plane", "point": [0, 0], "normal": [0, 1]}
 FLOOR = {"kind": "half_space", "point": [0, 0, 0], "normal": [0, 0, 1]}
 EXACT: list[tuple[Values, Values, list[float], float, int]] = [
-    (DISC, GROUND, [0, 1], 0.5, 1), (BRICK, GROUND, [0, 1], 0.5, 2),
-    (DISC, DISC | {"radius": 0.25}, [-1.5, 2], 1.75, 1), (DISC, BRICK | {"size": [2, 2]}, [0.25, 2], 0.5, 1),
+    (DISC, GROUND, [0, 1], 0.5, 1),
+    (BRICK, GROUND, [0, 1], 0.5, 2),
+    (DISC, DISC | {"radius": 0.25}, [-1.5, 2], 1.75, 1),
+    (DISC, BRICK | {"size": [2, 2]}, [0.25, 2], 0.5, 1),
     (DISC | {"radius": 1}, BRICK | {"size": [2, 2]}, [4, 5], 4.0, 1),
-    (BRICK, BRICK | {"size": [2, 2]}, [0.25, 2], 0.5, 2), (BRICK, BRICK | {"size": [2, 2]}, [-4.5, 5.5], 5.0, 1),
-    (BALL, FLOOR, [0, 0, 1], 0.5, 1), (CUBE | {"size": [1, 2, 0.5]}, FLOOR, [0, 0, 1], 0.75, 4),
-    (BALL, BALL | {"radius": 0.25}, [1, -2, 2], 2.25, 1), (BALL, CUBE | {"size": [2, 2, 2]}, [0.25, 0.5, -2], 0.5, 1),
+    (BRICK, BRICK | {"size": [2, 2]}, [0.25, 2], 0.5, 2),
+    (BRICK, BRICK | {"size": [2, 2]}, [-4.5, 5.5], 5.0, 1),
+    (BALL, FLOOR, [0, 0, 1], 0.5, 1),
+    (CUBE | {"size": [1, 2, 0.5]}, FLOOR, [0, 0, 1], 0.75, 4),
+    (BALL, BALL | {"radius": 0.25}, [1, -2, 2], 2.25, 1),
+    (BALL, CUBE | {"size": [2, 2, 2]}, [0.25, 0.5, -2], 0.5, 1),
     (BALL | {"radius": 1}, CUBE | {"size": [2, 2, 2]}, [3, -4, 7], 6.0, 1),
     (CUBE, CUBE | {"size": [2, 2, 2]}, [0.25, 2, 0.25], 0.5, 4),
 ]
 
 
 def pair_of(a: Values, b: Values, swapped: bool = False) -> System:
-    """A free body with shape a, and b: a wall, or the shape of another free body, which `swapped` puts first."""
+    """A free body with shape a, and b: a wall, or the shape of another free body, which `swapped`
+    puts first."""
     space = len(b.get("normal", b.get("size", [0, 0]))) == 3 or b["kind"] == "sphere"
-    free = {"joint": "free_flyer", "inertia": [1, 1, 1]} if space else {"joint": "planar", "inertia": 1}
-    bodies = [{"name": f"b{k}", "mass": 1.0, "shapes": [shape]} | free for k, shape in enumerate((a, b))]
+    free = (
+        {"joint": "free_flyer", "inertia": [1, 1, 1]}
+        if space
+        else {"joint": "planar", "inertia": 1}
+    )
+    bodies = [
+        {"name": f"b{k}", "mass": 1.0, "shapes": [shape]} | free for k, shape in enumerate((a, b))
+    ]
     if "normal" in b:
         return System(scene_of(bodies[:1], [{"name": "wall"} | b]))
     return System(scene_of(bodies[::-1] if swapped else bodies, []))
@@ -157,7 +215,9 @@ def test_a_gap_of_the_margin_is_kept_and_the_next_number_is_not(
 ) -> None:
     swapped, still = swapped and "normal" not in b, [0.0] * len(place)
     system = pair_of(a, b, swapped)
-    q = at_places(system, *((still, place) if swapped else (place,) if "normal" in b else (place, still)))
+    q = at_places(
+        system, *((still, place) if swapped else (place,) if "normal" in b else (place, still))
+    )
     found = system.contacts_at(q, gap)
     assert found.gap.tolist() == [gap] * number
     assert len(system.contacts_at(q, np.nextafter(gap, 0.0)).gap) == 0
@@ -176,8 +236,11 @@ def test_shapes_on_one_centre_have_finite_unit_normals(shape: Values, other: Val
 
 @pytest.mark.parametrize("tilt", [-1e-12, 0.0, 1e-12])
 @SPACES
-def test_a_flat_face_on_a_face_keeps_its_points_and_names_whichever_rounding_takes(space: bool, tilt: float) -> None:
-    """Two ends of the common edge; in space the four corners of the common rectangle, which also carry the middle."""
+def test_a_flat_face_on_a_face_keeps_its_points_and_names_whichever_rounding_takes(
+    space: bool, tilt: float
+) -> None:
+    """Two ends of the common edge; in space the four corners of the common rectangle, which also
+    carry the middle."""
     small, large = ([0.2, 0.2, 0.1], [0.6, 0.4, 0.1]) if space else ([0.2, 0.1], [0.6, 0.1])
     for top, ground in ((small, large), (large, small)):
         system = pair_of({"kind": "box", "size": top}, {"kind": "box", "size": ground})
@@ -185,9 +248,15 @@ def test_a_flat_face_on_a_face_keeps_its_points_and_names_whichever_rounding_tak
         q = at_places(system, place, [0.0] * len(place))
         found = system.contacts_at(q)
         low, high = -0.05 * np.ones(2) + [0.0, -0.02], 0.15 * np.ones(2) + [0.0, -0.02]
-        expected = [[x, y] for x in (low[0], high[0]) for y in (low[1], high[1])] if space else [[-0.05], [0.15]]
+        expected = (
+            [[x, y] for x in (low[0], high[0]) for y in (low[1], high[1])]
+            if space
+            else [[-0.05], [0.15]]
+        )
         if top == large:  # the lower one is the small box, about the origin
-            expected = [[x, y] for x in (-0.1, 0.1) for y in (-0.1, 0.1)] if space else [[-0.1], [0.1]]
+            expected = (
+                [[x, y] for x in (-0.1, 0.1) for y in (-0.1, 0.1)] if space else [[-0.1], [0.1]]
+            )
         got = sorted(found.point[:, : len(expected[0])].round(9).tolist())
         np.testing.assert_allclose(got, sorted(expected), atol=1e-9)
         np.testing.assert_allclose(found.gap, -1e-4, atol=1e-9)
@@ -198,8 +267,9 @@ def test_a_flat_face_on_a_face_keeps_its_points_and_names_whichever_rounding_tak
 @pytest.mark.parametrize("turn", [0.0, 0.5 * np.pi, np.pi])
 @pytest.mark.parametrize("offset", [(0.4, 0.0), (0.0, -0.3), (0.0, 0.0), (0.25, 0.1)])
 @pytest.mark.parametrize("noise", [0.0, 1e-16, -1e-16, 1e-13])
-def test_aligned_cubes_touch_at_the_corners_of_their_overlap(turn: float, offset: tuple[float, float],
-                                                             noise: float) -> None:  # fmt: skip
+def test_aligned_cubes_touch_at_the_corners_of_their_overlap(
+    turn: float, offset: tuple[float, float], noise: float
+) -> None:
     """Edges that lie on one another lose no corner to rounding, and count none twice."""
     x, y = offset
     place = [x + noise, y - noise, 1.0 - 1e-6, noise, noise, np.sin(0.5 * turn), np.cos(0.5 * turn)]
@@ -214,11 +284,15 @@ def test_aligned_cubes_touch_at_the_corners_of_their_overlap(turn: float, offset
 def test_every_side_of_a_box_that_a_ball_can_touch_has_a_name_of_its_own(space: bool) -> None:
     """8 regions around a rectangle, 26 around a cuboid; inside, those of the faces."""
     n, half = (3, np.array([0.3, 0.2, 0.4])) if space else (2, np.array([0.3, 0.2]))
-    system = pair_of((BALL if space else DISC) | {"radius": 0.05}, {"kind": "box", "size": (2.0 * half).tolist()})
+    system = pair_of(
+        (BALL if space else DISC) | {"radius": 0.05}, {"kind": "box", "size": (2.0 * half).tolist()}
+    )
     names: dict[int, tuple[int, ...]] = {}
     for number in range(3**n):
         signs = np.array([number // 3**k % 3 - 1 for k in range(n)])
-        for depth in (0.15, -0.02) if np.count_nonzero(signs) == 1 else (0.15,) if signs.any() else ():
+        for depth in (
+            (0.15, -0.02) if np.count_nonzero(signs) == 1 else (0.15,) if signs.any() else ()
+        ):
             place = np.where(signs != 0, signs * (half + depth), 0.1 * half)
             found = system.contacts_at(at_places(system, place.tolist(), [0.0] * n), 1.0)
             assert names.setdefault(int(found.feature[0]), tuple(signs)) == tuple(signs)
@@ -226,13 +300,22 @@ def test_every_side_of_a_box_that_a_ball_can_touch_has_a_name_of_its_own(space: 
 
 
 def test_faces_of_two_cubes_never_share_a_name() -> None:
-    """Six faces of the one against six of the other, each box as the one that clips: no name occurs twice."""
+    """Six faces of the one against six of the other, each box as the one that clips: no name occurs
+    twice."""
     owners: dict[int, tuple[Any, ...]] = {}
-    turns = [np.zeros(3), *([np.pi / 2 * s * np.eye(3)[k] for k in range(3) for s in (1, -1)]), np.array([np.pi, 0, 0])]
+    turns = [
+        np.zeros(3),
+        *([np.pi / 2 * s * np.eye(3)[k] for k in range(3) for s in (1, -1)]),
+        np.array([np.pi, 0, 0]),
+    ]
     for sizes in ([1.0, 0.8], [0.8, 1.0]):
         system = pair_of(*({"kind": "box", "size": [size] * 3} for size in sizes))
-        for axis, side, turn in ((k, s, turn) for k in range(3) for s in (1.0, -1.0) for turn in turns):
-            q = system.mechanism.integrate(system.mechanism.neutral(), np.concatenate([np.zeros(9), turn]))
+        for axis, side, turn in (
+            (k, s, turn) for k in range(3) for s in (1.0, -1.0) for turn in turns
+        ):
+            q = system.mechanism.integrate(
+                system.mechanism.neutral(), np.concatenate([np.zeros(9), turn])
+            )
             q[:3] = side * 0.899 * np.eye(3)[axis]
             facing = system.mechanism.placements(q)[0][1].T @ (side * np.eye(3)[axis])
             found, owner = system.contacts_at(q), (sizes[0], axis, side, *facing.round(6).tolist())
@@ -241,18 +324,31 @@ def test_faces_of_two_cubes_never_share_a_name() -> None:
                 assert owners.setdefault(feature, owner)[1:] == owner[1:]
 
 
-# --- the whole of a run ----------------------------------------------------------------------------------------------
+# --- the whole of a run
+# ----------------------------------------------------------------------------------------------
 
 
 def test_many_shapes_are_found_without_asking_all_pairs() -> None:
-    """Forty discs and a wall, in a grid that flies apart: a run finds what all pairs together give, in their order."""
+    """Forty discs and a wall, in a grid that flies apart: a run finds what all pairs together give,
+    in their order."""
     rng = np.random.default_rng(0)
-    bodies = [{"name": f"d{k}", "joint": "planar", "mass": 0.1, "inertia": 2e-5,
-               "shapes": [{"kind": "circle", "radius": 0.02, "center": [0.01, 0.0]}],
-               "position": [0.045 * (k % 7), 0.045 * (k // 7), float(rng.normal())],
-               "velocity": rng.normal(size=3).tolist()} for k in range(40)]
-    scene = scene_of(bodies, [{"name": "wall", "kind": "half_plane", "point": [0, -0.03], "normal": [0, 1]}],
-                     contact={"forces": "paper", "stiffness": 500, "restitution": 0.5})
+    bodies = [
+        {
+            "name": f"d{k}",
+            "joint": "planar",
+            "mass": 0.1,
+            "inertia": 2e-5,
+            "shapes": [{"kind": "circle", "radius": 0.02, "center": [0.01, 0.0]}],
+            "position": [0.045 * (k % 7), 0.045 * (k // 7), float(rng.normal())],
+            "velocity": rng.normal(size=3).tolist(),
+        }
+        for k in range(40)
+    ]
+    scene = scene_of(
+        bodies,
+        [{"name": "wall", "kind": "half_plane", "point": [0, -0.03], "normal": [0, 1]}],
+        contact={"forces": "paper", "stiffness": 500, "restitution": 0.5},
+    )
     run, system, found = simulate(scene), System(scene), 0
     for k in range(run.steps):
         rows, every = slice(*run.contacts.offsets[k : k + 2]), system.contacts_at(run.q[k])
@@ -264,20 +360,32 @@ def test_many_shapes_are_found_without_asking_all_pairs() -> None:
 
 def test_bodies_that_have_left_the_range_of_cells_are_found_too() -> None:
     """In space, a pair of touching balls far beyond what a grid numbers, among many that rest."""
-    bodies = [{"name": f"b{k}", "joint": "free_flyer", "mass": 1.0, "inertia": [1, 1, 1],
-               "shapes": [{"kind": "sphere", "radius": 0.25}], "position": [1.0 * k, 0, 0, 0, 0, 0, 1]}
-              for k in range(20)]
+    bodies = [
+        {
+            "name": f"b{k}",
+            "joint": "free_flyer",
+            "mass": 1.0,
+            "inertia": [1, 1, 1],
+            "shapes": [{"kind": "sphere", "radius": 0.25}],
+            "position": [1.0 * k, 0, 0, 0, 0, 0, 1],
+        }
+        for k in range(20)
+    ]
     for k, x in ((18, 8e8), (19, 8e8 + 0.25)):
         bodies[k]["position"] = [x, -8e8, 8e8, 0, 0, 0, 1]
     run = simulate(scene_of(bodies, []), steps=1)
     assert list(zip(run.contacts.body_a, run.contacts.body_b, strict=True)) == [(18, 19)]
 
 
-@pytest.mark.parametrize(("a", "b", "place", "gap", "number"), [each for each in EXACT if each[-1] > 1])
+@pytest.mark.parametrize(
+    ("a", "b", "place", "gap", "number"), [each for each in EXACT if each[-1] > 1]
+)
 def test_more_contacts_than_there_is_room_for_are_an_error(
     a: Values, b: Values, place: list[float], gap: float, number: int
 ) -> None:
     system = pair_of(a, b)
     system.capacity = number - 1
     with pytest.raises(IapbError):
-        system.contacts_at(at_places(system, place, *([[0.0] * len(place)] if "normal" not in b else [])), gap)
+        system.contacts_at(
+            at_places(system, place, *([[0.0] * len(place)] if "normal" not in b else [])), gap
+        )

@@ -1,4 +1,5 @@
-"""Impacts of (19)-(21), Poisson's law and Coulomb's against exact rationals; the kit: tests/verification/laws."""
+"""Impacts of (19)-(21), Poisson's law and Coulomb's against exact rationals; the kit:
+tests/verification/laws."""
 
 from __future__ import annotations
 
@@ -21,7 +22,8 @@ EPS = 2.0**-52
 Arrays = tuple[Floats, Floats, Floats]
 
 
-# --- one impact against exact rationals ------------------------------------------------------------------------------
+# --- one impact against exact rationals
+# ------------------------------------------------------------------------------
 
 
 def problem(seed: int, d: int = 4, c: int = 3, decades: float = 0.3) -> Arrays:
@@ -30,13 +32,23 @@ def problem(seed: int, d: int = 4, c: int = 3, decades: float = 0.3) -> Arrays:
     root, units = rng.normal(size=(d, d)), 10.0 ** rng.uniform(-decades, decades, d)
     mass = (root @ root.T + np.eye(d)) * units[:, None] * units
     rows = rng.normal(size=(c, d)) * units * 10.0 ** rng.uniform(-decades, decades, (c, 1))
-    return 0.5 * (mass + mass.T), rows, rng.normal(size=d) / units * 10.0 ** rng.uniform(-decades, decades)
+    return (
+        0.5 * (mass + mass.T),
+        rows,
+        rng.normal(size=d) / units * 10.0 ** rng.uniform(-decades, decades),
+    )
 
 
 def exact_change(M: Floats, v: Floats, w: Floats) -> Fraction:
     """½ (wᵀMw − vᵀMv) in rationals, for M as given."""
     a, b = ([Fraction(float(x)) for x in vector] for vector in (v, w))
-    return sum((Fraction(float(m)) * (b[i] * b[j] - a[i] * a[j]) for (i, j), m in np.ndenumerate(M)), Fraction(0)) / 2
+    return (
+        sum(
+            (Fraction(float(m)) * (b[i] * b[j] - a[i] * a[j]) for (i, j), m in np.ndenumerate(M)),
+            Fraction(0),
+        )
+        / 2
+    )
 
 
 def ill_conditioned(kappa: float, count: int) -> list[Arrays]:
@@ -46,13 +58,20 @@ def ill_conditioned(kappa: float, count: int) -> list[Arrays]:
         d = int(rng.integers(2, 9))
         turn, _ = np.linalg.qr(rng.normal(size=(d, d)))
         mass = turn * np.append(kappa ** rng.uniform(0.0, 1.0, d - 1), kappa) @ turn.T
-        found.append((0.5 * (mass + mass.T), rng.normal(size=(int(rng.integers(1, d + 1)), d)), rng.normal(size=d)))
+        found.append(
+            (
+                0.5 * (mass + mass.T),
+                rng.normal(size=(int(rng.integers(1, d + 1)), d)),
+                rng.normal(size=d),
+            )
+        )
     return found
 
 
 @pytest.mark.parametrize("kappa", [1e4, 1e8, 1e12])
 def test_exact_passivity_costs_no_restitution(kappa: float) -> None:
-    """Relative to the contacts' own speed. Impacts that are shortened until they gain nothing miss by up to 2e-3."""
+    """Relative to the contacts' own speed. Impacts that are shortened until they gain nothing miss
+    by up to 2e-3."""
     for M, J, v in ill_conditioned(kappa, 100):
         found, approach = resolve_impact(M, J, v, 1.0), J @ v
         assert np.abs(J @ found.velocity + approach).max() <= 1e-10 * np.abs(approach).max()
@@ -66,16 +85,21 @@ def test_poissons_law_is_complete_only_if_no_contact_closes(kappa: float) -> Non
         impact = resolve_impact(M, J, v, np.linspace(0.0, 1.0, len(J)), method="poisson")
         found.append((impact.status, -(J @ impact.velocity).min() <= 1e-6 * np.abs(J @ v).max()))
     assert ("complete", False) not in found and ("complete", True) in found
-    assert kappa < 1e10 or ("not solved", False) in found  # some 12 of 1000, whatever rounds the draws
+    assert (
+        kappa < 1e10 or ("not solved", False) in found
+    )  # some 12 of 1000, whatever rounds the draws
 
 
 @pytest.mark.parametrize("seed", range(30))
 @pytest.mark.parametrize("clamp", [True, False])
 @pytest.mark.parametrize("decades", [0.3, 4.0, 40.0])
 def test_an_impact_is_the_exact_one_in_every_unit(seed: int, clamp: bool, decades: float) -> None:
-    """v⁺ of (21), M(v⁺ − v) = P = Jᵀp, p of least norm; the interval encloses the exact change of energy, tightly."""
+    """v⁺ of (21), M(v⁺ − v) = P = Jᵀp, p of least norm; the interval encloses the exact change of
+    energy, tightly."""
     M, J, v = problem(seed, decades=decades)
-    if decades < 1.0:  # dependent to the last bit of these rows only; in rationals of rank five at most
+    if (
+        decades < 1.0
+    ):  # dependent to the last bit of these rows only; in rationals of rank five at most
         J = np.vstack((J, 2.0 * J[2], J[1], 0.0 * J[0]))
     e = (0.0, 0.25, -0.5)[seed % 3]
     M = M + np.triu(M * EPS, 1) * (seed % 2)  # a skew part in the last bit belongs to M
@@ -83,26 +107,37 @@ def test_an_impact_is_the_exact_one_in_every_unit(seed: int, clamp: bool, decade
     truth = exact_impact(0.5 * (M + M.T), J, v, e)
     scale = np.sqrt(np.diag(M))
     size = np.linalg.norm(scale * v)
-    np.testing.assert_allclose(scale * (found.velocity - truth.rounded_velocity), 0.0, atol=1e-10 * size)
+    np.testing.assert_allclose(
+        scale * (found.velocity - truth.rounded_velocity), 0.0, atol=1e-10 * size
+    )
     momentum = np.array([float(x) for x in truth.generalized_impulse])
-    np.testing.assert_allclose(found.generalized_impulse / scale, momentum / scale, atol=1e-10 * size)
+    np.testing.assert_allclose(
+        found.generalized_impulse / scale, momentum / scale, atol=1e-10 * size
+    )
     np.testing.assert_allclose(J.T @ found.impulses / scale, momentum / scale, atol=1e-10 * size)
     if decades < 1.0:
         least = np.linalg.pinv(J.T, rcond=1e-10) @ momentum
         np.testing.assert_allclose(found.impulses, least, atol=1e-9 * np.abs(least).max())
-    assert (found.rank, found.status) == (3, "complete") and found.clamp == pytest.approx(1.0, abs=1e-13)
+    assert (found.rank, found.status) == (3, "complete") and found.clamp == pytest.approx(
+        1.0, abs=1e-13
+    )
     change, (low, high) = exact_change(M, v, found.velocity), found.energy_interval
     assert Fraction(low) <= change <= Fraction(high) and low <= found.energy_change <= high
-    assert abs(Fraction(found.energy_change) - change) <= Fraction(0.51 * math.ulp(found.energy_change))
+    assert abs(Fraction(found.energy_change) - change) <= Fraction(
+        0.51 * math.ulp(found.energy_change)
+    )
     assert high <= 0.0 or not clamp
     energy = float(v @ M @ v)
-    assert high - low <= 5.0 * math.ulp(found.energy_change) + 1e-28 * energy * 10.0 ** min(decades, 3.0)
+    assert high - low <= 5.0 * math.ulp(found.energy_change) + 1e-28 * energy * 10.0 ** min(
+        decades, 3.0
+    )
 
 
 @pytest.mark.parametrize("power", [-535, -525, -400, 0, 300, 500, 511])
 @pytest.mark.parametrize("skew", [0.0, EPS])
 def test_energy_is_enclosed_where_its_squares_leave_the_range(power: int, skew: float) -> None:
-    """Elastic and back: all but rounding cancels. Of entries asymmetric in the last bit both count."""
+    """Elastic and back: all but rounding cancels. Of entries asymmetric in the last bit both
+    count."""
     for seed in range(40):
         M, J, v = problem(seed, d=3, c=2)
         M = M + np.triu(np.abs(M) * skew, 1)
@@ -117,25 +152,44 @@ def test_energy_is_enclosed_where_its_squares_leave_the_range(power: int, skew: 
 
 
 def test_energy_is_enclosed_where_only_halves_of_its_products_overflow() -> None:
-    """Δ A s is finite, but not the product of the rounded halves of its factors; a bound of −∞ is not accepted."""
-    M, v = np.array([[float.fromhex("0x1.492a43be43642p-1")]]), np.array([float.fromhex("-0x1.c386bbc204f8ap+511")])
+    """Δ A s is finite, but not the product of the rounded halves of its factors; a bound of −∞ is
+    not accepted."""
+    M, v = (
+        np.array([[float.fromhex("0x1.492a43be43642p-1")]]),
+        np.array([float.fromhex("-0x1.c386bbc204f8ap+511")]),
+    )
     found = resolve_impact(M, np.eye(1), v, 0.0)
     change, (low, high) = exact_change(M, v, found.velocity), found.energy_interval
     assert Fraction(low) <= change <= Fraction(high) < 0
     assert abs(Fraction(found.energy_change) - change) <= Fraction(math.ulp(found.energy_change))
 
 
-@given(seed=st.integers(0, 10_000), powers=st.lists(st.integers(-60, 60), min_size=6, max_size=6),
-       speed=st.integers(-200, 200), mass=st.integers(-100, 100), clamp=st.booleans())
-def test_units_by_powers_of_two_change_no_bit(seed: int, powers: list[int], speed: int, mass: int, clamp: bool) -> None:
-    """q' = 2^−s q, rows times 2^r, time and mass in other units: results differ by their units alone."""
+@given(
+    seed=st.integers(0, 10_000),
+    powers=st.lists(st.integers(-60, 60), min_size=6, max_size=6),
+    speed=st.integers(-200, 200),
+    mass=st.integers(-100, 100),
+    clamp=st.booleans(),
+)
+def test_units_by_powers_of_two_change_no_bit(
+    seed: int, powers: list[int], speed: int, mass: int, clamp: bool
+) -> None:
+    """q' = 2^−s q, rows times 2^r, time and mass in other units: results differ by their units
+    alone."""
     M, J, v = problem(seed, d=5, c=4)
     J, s, r = np.vstack((J, J[0] + J[1], 0.0 * J[0])), np.array(powers[:5]), powers[5]
     plain = resolve_impact(M, J, v, 0.4, clamp=clamp)
-    other = resolve_impact(np.ldexp(M, s[:, None] + s + 2 * mass), np.ldexp(J, s + r), np.ldexp(v, speed - s), 0.4,
-                           clamp=clamp)
+    other = resolve_impact(
+        np.ldexp(M, s[:, None] + s + 2 * mass),
+        np.ldexp(J, s + r),
+        np.ldexp(v, speed - s),
+        0.4,
+        clamp=clamp,
+    )
     assert np.array_equal(other.velocity, np.ldexp(plain.velocity, speed - s))
-    assert np.array_equal(other.generalized_impulse, np.ldexp(plain.generalized_impulse, s + speed + 2 * mass))
+    assert np.array_equal(
+        other.generalized_impulse, np.ldexp(plain.generalized_impulse, s + speed + 2 * mass)
+    )
     assert np.array_equal(other.impulses, np.ldexp(plain.impulses, speed + 2 * mass - r))
     assert other.energy_change == math.ldexp(plain.energy_change, 2 * (speed + mass))
     assert (other.rank, other.status, other.clamp) == (plain.rank, plain.status, plain.clamp)
@@ -153,18 +207,29 @@ def test_subnormal_speeds_have_the_nearest_result_that_exists() -> None:
 def test_of_a_mass_matrix_with_rounding_in_it_the_symmetric_part_counts() -> None:
     M, J, v = problem(3)
     skew = 1e-11 * np.triu(M, 1)
-    given, symmetric, plain = (resolve_impact(each, J, v, 0.4).velocity for each in (
-        M + skew, M + 0.5 * (skew + skew.T), M))
+    given, symmetric, plain = (
+        resolve_impact(each, J, v, 0.4).velocity
+        for each in (M + skew, M + 0.5 * (skew + skew.T), M)
+    )
     np.testing.assert_allclose(given, symmetric, rtol=1e-14, atol=1e-14)
     assert not np.allclose(given, plain, rtol=1e-14, atol=1e-14)
 
 
-@given(seed=st.integers(0, 10_000), d=st.integers(1, 6), c=st.integers(0, 8), clamp=st.booleans(),
-       budget=st.none() | st.integers(0, 6), tolerance=st.sampled_from([None, 1e-6]))
+@given(
+    seed=st.integers(0, 10_000),
+    d=st.integers(1, 6),
+    c=st.integers(0, 8),
+    clamp=st.booleans(),
+    budget=st.none() | st.integers(0, 6),
+    tolerance=st.sampled_from([None, 1e-6]),
+)
 def test_many_at_once_are_those_one_by_one_bit_for_bit(
     seed: int, d: int, c: int, clamp: bool, budget: int | None, tolerance: float | None
 ) -> None:
-    rng, options = np.random.default_rng(seed), {"clamp": clamp, "budget": budget, "rank_tolerance": tolerance}
+    rng, options = (
+        np.random.default_rng(seed),
+        {"clamp": clamp, "budget": budget, "rank_tolerance": tolerance},
+    )
     root = rng.normal(size=(5, d, d))
     masses = root @ root.transpose(0, 2, 1) + 10.0 ** rng.uniform(-9, 0) * np.eye(d)
     rows = rng.normal(size=(5, c, d)) * 10.0 ** rng.uniform(-6, 6, (5, c, 1))
@@ -173,57 +238,84 @@ def test_many_at_once_are_those_one_by_one_bit_for_bit(
     found: Any = resolve_impacts(masses, rows, v, e, **options)  # type: ignore[arg-type]
     for k in range(5):
         single = resolve_impact(masses[k], rows[k], v[k], e[k], **options)  # type: ignore[arg-type]
-        for name in ("velocity", "generalized_impulse", "impulses", "energy_interval", "rank", "energy_change", "clamp",
-                     "status"):
-            np.testing.assert_array_equal(getattr(found, name)[k], getattr(single, name), strict=False)
+        for name in (
+            "velocity",
+            "generalized_impulse",
+            "impulses",
+            "energy_interval",
+            "rank",
+            "energy_change",
+            "clamp",
+            "status",
+        ):
+            np.testing.assert_array_equal(
+                getattr(found, name)[k], getattr(single, name), strict=False
+            )
 
 
-# --- how an impact ends; ranks and tolerances ------------------------------------------------------------------------
+# --- how an impact ends; ranks and tolerances
+# ------------------------------------------------------------------------
 
 V, NEAR = [-1.0, -2.0, 3.0], [[1.0, 0.0, 0.0], [1.0, 1e-4, 0.0]]
 
 
-@pytest.mark.parametrize(("rows", "v", "options", "status", "rank"), [
-    (np.eye(3), V, {}, "complete", 3),
-    (np.eye(3), V, {"budget": 2}, "budget", 2),
-    (np.eye(3)[:2], V, {"budget": 2}, "complete", 2),
-    (np.eye(3), V, {"budget": 3}, "complete", 3),
-    (np.eye(3), V, {"budget": 0}, "budget", 0),
-    (np.eye(3), V, {"budget": 10**30}, "complete", 3),
-    (np.tile([1.0, 0.0, 0.0], (6, 1)), V, {"budget": 1}, "complete", 1),
-    (NEAR, V, {"budget": 1, "rank_tolerance": 1e-3}, "complete", 1),
-    (NEAR, V, {"budget": 1, "rank_tolerance": 1e-5}, "budget", 1),
-    (NEAR, V, {"rank_tolerance": 1e-3}, "complete", 1),
-    (NEAR, V, {"rank_tolerance": 1e-5}, "complete", 2),
-    ([[1.0, 0.0, 0.0], [1.0, 1e-9, 0.0]], V, {}, "complete", 2),
-    ([[1.0, 0.0, 0.0], [1.0, 1e-11, 0.0]], V, {}, "complete", 1),
-    ([[1.0, 0.0, 0.0]], [-1e-300, 1e100, 0.0], {}, "cancelled", 1),
-    ([], V, {}, "complete", 0),
-    (np.zeros((2, 3)), V, {}, "complete", 0),
-])
-def test_how_an_impact_ends(rows: Any, v: list[float], options: dict[str, Any], status: str, rank: int) -> None:
+@pytest.mark.parametrize(
+    ("rows", "v", "options", "status", "rank"),
+    [
+        (np.eye(3), V, {}, "complete", 3),
+        (np.eye(3), V, {"budget": 2}, "budget", 2),
+        (np.eye(3)[:2], V, {"budget": 2}, "complete", 2),
+        (np.eye(3), V, {"budget": 3}, "complete", 3),
+        (np.eye(3), V, {"budget": 0}, "budget", 0),
+        (np.eye(3), V, {"budget": 10**30}, "complete", 3),
+        (np.tile([1.0, 0.0, 0.0], (6, 1)), V, {"budget": 1}, "complete", 1),
+        (NEAR, V, {"budget": 1, "rank_tolerance": 1e-3}, "complete", 1),
+        (NEAR, V, {"budget": 1, "rank_tolerance": 1e-5}, "budget", 1),
+        (NEAR, V, {"rank_tolerance": 1e-3}, "complete", 1),
+        (NEAR, V, {"rank_tolerance": 1e-5}, "complete", 2),
+        ([[1.0, 0.0, 0.0], [1.0, 1e-9, 0.0]], V, {}, "complete", 2),
+        ([[1.0, 0.0, 0.0], [1.0, 1e-11, 0.0]], V, {}, "complete", 1),
+        ([[1.0, 0.0, 0.0]], [-1e-300, 1e100, 0.0], {}, "cancelled", 1),
+        ([], V, {}, "complete", 0),
+        (np.zeros((2, 3)), V, {}, "complete", 0),
+    ],
+)
+def test_how_an_impact_ends(
+    rows: Any, v: list[float], options: dict[str, Any], status: str, rank: int
+) -> None:
     found = resolve_impact(np.eye(3), rows, v, 0.5, **options)
     assert (found.status, found.rank, found.rows_used) == (status, rank, options.get("budget"))
-    assert rank > 0 or np.array_equal(found.velocity, v) and not found.impulses.any() and found.energy_change == 0.0
+    assert (
+        rank > 0
+        or np.array_equal(found.velocity, v)
+        and not found.impulses.any()
+        and found.energy_change == 0.0
+    )
 
 
 def test_a_budget_takes_the_rows_that_close_fastest_and_each_takes_energy() -> None:
-    """Rows orthogonal in the kinetic metric: the fastest are reversed, the others keep their speed."""
+    """Rows orthogonal in the kinetic metric: the fastest are reversed, the others keep their
+    speed."""
     for seed in range(5):
         M, _, v = problem(seed, d=5)
-        rows = (np.linalg.cholesky(M) @ np.linalg.qr(np.random.default_rng(seed).normal(size=(5, 4)))[0]).T
+        rows = (
+            np.linalg.cholesky(M) @ np.linalg.qr(np.random.default_rng(seed).normal(size=(5, 4)))[0]
+        ).T
         speeds, change = rows @ v, 0.0
         rows = rows * [[1.0], [20.0], [0.3], [4.0]]
         for budget in range(5):
             found, expected = resolve_impact(M, rows, v, 0.5, budget=budget), speeds.copy()
             expected[np.argsort(-np.abs(speeds))[:budget]] *= -0.5
-            np.testing.assert_allclose(rows @ found.velocity / [1.0, 20.0, 0.3, 4.0], expected, atol=1e-12)
+            np.testing.assert_allclose(
+                rows @ found.velocity / [1.0, 20.0, 0.3, 4.0], expected, atol=1e-12
+            )
             assert found.energy_change <= change
             change = found.energy_change
 
 
 def test_rounding_of_an_ill_conditioned_mass_matrix_is_not_taken_for_contacts() -> None:
-    """Rank three by construction, κ(M) = 1e12: whitening leaves noise of about ε κ(L) in dependent rows."""
+    """Rank three by construction, κ(M) = 1e12: whitening leaves noise of about ε κ(L) in dependent
+    rows."""
     for seed in range(20):
         rng = np.random.default_rng(seed)
         basis = np.linalg.qr(rng.normal(size=(10, 10)))[0]
@@ -232,13 +324,19 @@ def test_rounding_of_an_ill_conditioned_mass_matrix_is_not_taken_for_contacts() 
         assert resolve_impact(0.5 * (M + M.T), rows, rng.normal(size=10), 0.5).rank == 3
 
 
-# --- contacts that only push -----------------------------------------------------------------------------------------
+# --- contacts that only push
+# -----------------------------------------------------------------------------------------
+
 
 @given(seed=st.integers(0, 100_000), d=st.integers(2, 6), c=st.integers(2, 6))
 def test_unequal_restitution_is_poissons_law(seed: int, d: int, c: int) -> None:
-    """As the reference solves its two problems; what dependent rows leave open is still passive and only pushes."""
+    """As the reference solves its two problems; what dependent rows leave open is still passive and
+    only pushes."""
     M, J, v = problem(seed, d, c)
-    J, rng = J * 10.0 ** np.random.default_rng(seed).uniform(-2, 2, (c, 1)), np.random.default_rng(seed + 1)
+    J, rng = (
+        J * 10.0 ** np.random.default_rng(seed).uniform(-2, 2, (c, 1)),
+        np.random.default_rng(seed + 1),
+    )
     J[-1] *= rng.random() < 0.8
     e = rng.uniform(0.0, 1.0, c)
     found = resolve_impact(M, J, v, e)
@@ -247,7 +345,9 @@ def test_unequal_restitution_is_poissons_law(seed: int, d: int, c: int) -> None:
     assert found.law == "Poisson, two LCPs" and found.status == "complete"
     assert found.energy_change <= 0.0 and found.impulses.min() >= 0.0 and found.clamp >= 1.0 - 1e-13
     assert (J @ found.velocity >= -1e-11 * size * length).all()
-    np.testing.assert_allclose(M @ (found.velocity - v), J.T @ found.impulses, atol=1e-10 * size * np.abs(M).max())
+    np.testing.assert_allclose(
+        M @ (found.velocity - v), J.T @ found.impulses, atol=1e-10 * size * np.abs(M).max()
+    )
     if np.linalg.matrix_rank(J[length > 0.0]) == np.count_nonzero(length):
         truth = poisson(ImpactProblem.from_impact(M, J[length > 0.0], v, e[length > 0.0]))
         v_plus, p = truth.velocity, truth.impulse
@@ -257,7 +357,8 @@ def test_unequal_restitution_is_poissons_law(seed: int, d: int, c: int) -> None:
 
 
 def test_many_contacts_that_all_face_the_motion_are_settled() -> None:
-    """Forty normals about one direction, struck along it: several rows stop pushing at once, the nearest goes first."""
+    """Forty normals about one direction, struck along it: several rows stop pushing at once, the
+    nearest goes first."""
     for seed in (25, 90, 101, 103, 109, 110, 133):
         rng = np.random.default_rng(seed)
         rows = rng.normal(size=(40, 10)) + rng.normal(size=10)
@@ -274,11 +375,14 @@ def test_nearly_parallel_contacts_converge(difference: float) -> None:
     for seed in range(5):
         rng = np.random.default_rng(seed)
         rows = np.array([1.0, 0.0, 0.0]) + difference * rng.normal(size=(8, 3))
-        found = resolve_impact(np.diag([1.0, 2.0, 3.0]), rows, [-1.0, 0.5, -0.5], rng.uniform(0, 1, 8), clamp=False)
+        found = resolve_impact(
+            np.diag([1.0, 2.0, 3.0]), rows, [-1.0, 0.5, -0.5], rng.uniform(0, 1, 8), clamp=False
+        )
         assert found.energy_change <= 1e-13 and (rows @ found.velocity).min() >= -1e-10
 
 
-# --- friction in an impact -------------------------------------------------------------------------------------------
+# --- friction in an impact
+# -------------------------------------------------------------------------------------------
 
 
 def rubbing(seed: int, most: float = 2.0) -> tuple[Any, ...]:
@@ -293,7 +397,8 @@ def rubbing(seed: int, most: float = 2.0) -> tuple[Any, ...]:
 
 @pytest.mark.parametrize("most", [1.0, 2.0])
 def test_friction_obeys_coulomb_keeps_restitution_and_gains_nothing(most: float) -> None:
-    """M Δv = Jᵀp + Tᵀp_t within the cones; sticks or slides if complete; reduced no more than its energy demands."""
+    """M Δv = Jᵀp + Tᵀp_t within the cones; sticks or slides if complete; reduced no more than its
+    energy demands."""
     seen: dict[str, int] = {"complete": 0, "reduced": 0, "obeyed": 0, "cut": 0}
     for seed in range(300):
         M, J, T, v, e, mu = rubbing(seed, most)
@@ -303,16 +408,24 @@ def test_friction_obeys_coulomb_keeps_restitution_and_gains_nothing(most: float)
         scale = np.abs(J) @ (np.abs(v) + np.abs(found.velocity) + np.abs(plain.velocity))
         assert np.all(np.abs(J @ (found.velocity - plain.velocity)) <= 1e-9 * scale)
         pushed = J.T @ p + np.einsum("cmd,cm->d", T, p_t)
-        size = np.abs(J).T @ np.abs(p) + np.einsum("cmd,cm->d", np.abs(T), np.abs(p_t)) + np.abs(M @ v)
+        size = (
+            np.abs(J).T @ np.abs(p) + np.einsum("cmd,cm->d", np.abs(T), np.abs(p_t)) + np.abs(M @ v)
+        )
         for momentum in (M @ (found.velocity - v), found.generalized_impulse):
             assert np.all(np.abs(momentum - pushed) <= 1e-8 * size)
         limit = mu * np.maximum(p, 0.0)
         assert np.all(np.linalg.norm(p_t, axis=1) <= limit * (1 + 1e-9) + 1e-12 * np.abs(p).max())
         seen[found.status] += 1
-        if found.friction_share < 1.0 - 1e-9 and found.status == "complete":  # as much as keeps the energy
+        if (
+            found.friction_share < 1.0 - 1e-9 and found.status == "complete"
+        ):  # as much as keeps the energy
             seen["cut"] += 1
             assert found.energy_change == pytest.approx(0.0, abs=1e-9 * energy)
-        elif found.status == "complete" and plain.impulses.min() > 0.0 and len(J) * (1 + T.shape[1]) <= len(v):
+        elif (
+            found.status == "complete"
+            and plain.impulses.min() > 0.0
+            and len(J) * (1 + T.shape[1]) <= len(v)
+        ):
             seen["obeyed"] += 1
             worst = breach_of_coulomb(T, p_t, limit, found.velocity)
             assert worst <= 1e-7 * np.abs(T).max() * np.linalg.norm(v) * len(v)
@@ -322,22 +435,30 @@ def test_friction_obeys_coulomb_keeps_restitution_and_gains_nothing(most: float)
 
 @pytest.mark.parametrize("seed", [12, 41, 45, 104, 133, 172, 233, 354, 369])
 def test_limits_that_swing_at_first_settle(seed: int) -> None:
-    """Without damping, or with another one than half and a fifth, these do not within the rounds."""
+    """Without damping, or with another one than half and a fifth, these do not within the
+    rounds."""
     assert resolve_frictional_impact(*rubbing(seed, 1.0)).status == "complete"
 
 
 def on_the_floor(points: Any) -> tuple[Any, Any, Any]:
     """M, J and T of a unit mass whose given points (c, 3) strike the floor z = 0."""
-    jacobians = [np.hstack([np.eye(3), np.cross(np.eye(3), arm)]) for arm in np.asarray(points, float)]
+    jacobians = [
+        np.hstack([np.eye(3), np.cross(np.eye(3), arm)]) for arm in np.asarray(points, float)
+    ]
     M = np.diag([1.0, 1.0, 1.0, 0.02, 0.03, 0.04])
     return M, np.array([j[2] for j in jacobians]), np.array([j[:2] for j in jacobians])
 
 
-@pytest.mark.parametrize("v", [[3, -1, -2, 0, 0, 0], [0.05, 0.1, -2, 0, 0, 0.1], [1, 0.5, -2, 0.3, 0.2, 1]])
+@pytest.mark.parametrize(
+    "v", [[3, -1, -2, 0, 0, 0], [0.05, 0.1, -2, 0, 0, 0.1], [1, 0.5, -2, 0.3, 0.2, 1]]
+)
 def test_redundant_contacts_settle_and_more_of_them_change_nothing(v: list[float]) -> None:
-    """Nine points of one face: the normal impulses are not unique, the motion of a flat sliding bounce is."""
+    """Nine points of one face: the normal impulses are not unique, the motion of a flat sliding
+    bounce is."""
     corners = [(x, y, -0.1) for x in (-0.2, 0.2) for y in (-0.3, 0.3)]
-    middles = [(x, y, -0.1) for x in (-0.2, 0.0, 0.2) for y in (-0.3, 0.0, 0.3) if x == 0.0 or y == 0.0]
+    middles = [
+        (x, y, -0.1) for x in (-0.2, 0.0, 0.2) for y in (-0.3, 0.0, 0.3) if x == 0.0 or y == 0.0
+    ]
     four = resolve_frictional_impact(*on_the_floor(corners), v, 0.5, 0.3)
     nine = resolve_frictional_impact(*on_the_floor(corners + middles), v, 0.5, 0.3)
     assert four.status == nine.status == "complete" and nine.impulses.min() >= 0.0
@@ -349,13 +470,16 @@ def test_a_lever_that_sticks_stops_dead() -> None:
     """Tangents a hundred times apart in inertia, and friction that presses the point down."""
     jacobian = np.hstack([np.eye(3), np.cross(np.eye(3), [1.0, 0.0, -0.3])])
     M = np.diag([1.0, 1.0, 1.0, 0.01, 0.01, 0.01])
-    found = resolve_frictional_impact(M, jacobian[2:], jacobian[None, :2], [1.0, 1.0, -1.0, 0.0, 0.0, 0.0], 0.0, 8.0)
+    found = resolve_frictional_impact(
+        M, jacobian[2:], jacobian[None, :2], [1.0, 1.0, -1.0, 0.0, 0.0, 0.0], 0.0, 8.0
+    )
     assert found.status == "complete"
     np.testing.assert_allclose(jacobian @ found.velocity, 0.0, atol=1e-10)
 
 
 def test_friction_that_loads_its_own_contact_is_solved_exactly() -> None:
-    """A contact that slides while μ ∂p_n/∂p_t is 0.9: p_t = −μ p_n, which plain rounds approach by a tenth each."""
+    """A contact that slides while μ ∂p_n/∂p_t is 0.9: p_t = −μ p_n, which plain rounds approach by
+    a tenth each."""
     jacobian, M = np.array([[1.0, 0.0, 0.9], [0.0, 1.0, 1.0]]), np.diag([1.0, 1.0, 0.5])
     W = jacobian @ np.linalg.solve(M, jacobian.T)
     mu = 0.9 * W[1, 1] / W[0, 1]
@@ -367,12 +491,15 @@ def test_friction_that_loads_its_own_contact_is_solved_exactly() -> None:
 
 @pytest.mark.parametrize("power", [-40, 0, 40])
 def test_in_a_corner_friction_has_nothing_to_do_in_any_unit_of_mass(power: int) -> None:
-    """Where every tangent is the other contact's normal, what is left of it is rounding, however light the mass."""
+    """Where every tangent is the other contact's normal, what is left of it is rounding, however
+    light the mass."""
     for seed in range(20):
         M, _, v = problem(seed, d=2)
         normals = np.linalg.qr(np.random.default_rng(seed).normal(size=(2, 2)))[0]
         found = resolve_frictional_impact(4.0**power * M, normals, normals[::-1, None], v, 0.3, 0.8)
-        assert np.array_equal(found.velocity, resolve_impact(4.0**power * M, normals, v, 0.3).velocity)
+        assert np.array_equal(
+            found.velocity, resolve_impact(4.0**power * M, normals, v, 0.3).velocity
+        )
         assert not found.tangential_impulses.any()
 
 
@@ -382,5 +509,7 @@ def test_units_change_no_bit_of_friction(seed: int, mass: int, speed: int) -> No
     plain = resolve_frictional_impact(M, J, T, v, e, mu)
     other = resolve_frictional_impact(np.ldexp(M, 2 * mass), J, T, np.ldexp(v, speed), e, mu)
     assert np.array_equal(other.velocity, np.ldexp(plain.velocity, speed))
-    assert np.array_equal(other.tangential_impulses, np.ldexp(plain.tangential_impulses, speed + 2 * mass))
+    assert np.array_equal(
+        other.tangential_impulses, np.ldexp(plain.tangential_impulses, speed + 2 * mass)
+    )
     assert (other.friction_share, other.status) == (plain.friction_share, plain.status)

@@ -1,4 +1,5 @@
-"""The engine's laws over whole runs: e = −1, renderings, bystanders, equal values, orders and the energy ledger."""
+"""The engine's laws over whole runs: e = −1, renderings, bystanders, equal values, orders and the
+energy ledger."""
 
 from __future__ import annotations
 
@@ -22,11 +23,18 @@ def shipped(name: str) -> Scene:
 START = {"bodies.peg.position": [0.0209, -0.0141, 0.08], "contact.friction": 0.1, "duration": 1.5}
 LIMIT = np.array([3.0, 3.0, 0.05])
 PEG = shipped("peg_corner").with_values(START | {"device.force_limit": LIMIT.tolist()})
-SCENES = {"peg": PEG, "elastic peg": PEG.with_values({"contact.restitution": 0.7}),
-          **{name: shipped(name) for name in ("peg_hole", "arm_pushing", "newton_cradle", "three_link_arm_elastic")}}
+SCENES = {
+    "peg": PEG,
+    "elastic peg": PEG.with_values({"contact.restitution": 0.7}),
+    **{
+        name: shipped(name)
+        for name in ("peg_hole", "arm_pushing", "newton_cradle", "three_link_arm_elastic")
+    },
+}
 
 
-# --- C09 and the renderings of section VI ----------------------------------------------------------------------------
+# --- C09 and the renderings of section VI
+# ----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -50,46 +58,83 @@ def test_saturation_clips_the_device_and_nothing_else() -> None:
     assert np.all(run.impacts.scale == 1.0)
     assert run.device_force == pytest.approx(np.clip(asked, -LIMIT, LIMIT), abs=1e-12)
     assert np.any(np.abs(run.environment_force) > LIMIT)
-    alone = [simulate(PEG, ImpulseAugmented(rendering=rendering)).q for rendering in ("full", "saturate")]
+    alone = [
+        simulate(PEG, ImpulseAugmented(rendering=rendering)).q for rendering in ("full", "saturate")
+    ]
     assert np.array_equal(*alone)  # without a device it changes nothing
 
 
-def test_spreading_stays_in_collision_longer_than_scaling_and_without_limits_all_renderings_are_one() -> None:
+def test_spreading_stays_in_collision_longer_than_scaling_and_without_limits_all_renderings_are_one() -> (
+    None
+):
     longest = {}
     for rendering in ("scale", "spread"):
         colliding = simulate(PEG, ImpulseAugmented(rendering=rendering)).state == COLLIDING
-        longest[rendering] = np.max(np.diff(np.flatnonzero(np.diff(np.concatenate([[0], colliding, [0]]))))[::2])
+        longest[rendering] = np.max(
+            np.diff(np.flatnonzero(np.diff(np.concatenate([[0], colliding, [0]]))))[::2]
+        )
     assert longest["spread"] > longest["scale"]
-    first, *others = [simulate(PEG.with_values({"device": None}), ImpulseAugmented(rendering=each)).q
-                      for each in RENDERINGS]
+    first, *others = [
+        simulate(PEG.with_values({"device": None}), ImpulseAugmented(rendering=each)).q
+        for each in RENDERINGS
+    ]
     assert all(np.array_equal(first, other) for other in others)
 
 
-@pytest.mark.parametrize(("restitution", "leaves_with", "steps"), [(0.0, 0.0, 7), (0.5, 0.0025, None)])
+@pytest.mark.parametrize(
+    ("restitution", "leaves_with", "steps"), [(0.0, 0.0, 7), (0.5, 0.0025, None)]
+)
 def test_spreading_delivers_the_prescribed_velocity_for_plastic_impacts_only(
     restitution: float, leaves_with: float, steps: int | None
 ) -> None:
-    """Erratum 5, with its numbers: 2 kg at 0.1 m/s, 15 N and 512 Hz leave with 0.0025 m/s instead of 0.05 m/s."""
+    """Erratum 5, with its numbers: 2 kg at 0.1 m/s, 15 N and 512 Hz leave with 0.0025 m/s instead
+    of 0.05 m/s."""
     scene = scene_of(
-        [{"name": "tool", "joint": "prismatic", "axis": [1, 0], "mass": 2.0, "position": [-1e-5], "velocity": [-0.1],
-          "shapes": [{"kind": "circle", "radius": 0.01}]}],
-        [{"name": "wall", "kind": "half_plane", "point": [-0.01, 0], "normal": [1, 0]}], rate=512.0, duration=0.1,
+        [
+            {
+                "name": "tool",
+                "joint": "prismatic",
+                "axis": [1, 0],
+                "mass": 2.0,
+                "position": [-1e-5],
+                "velocity": [-0.1],
+                "shapes": [{"kind": "circle", "radius": 0.01}],
+            }
+        ],
+        [{"name": "wall", "kind": "half_plane", "point": [-0.01, 0], "normal": [1, 0]}],
+        rate=512.0,
+        duration=0.1,
         contact={"forces": "paper", "stiffness": 0, "damping": 0, "restitution": restitution},
-        hand={"body": "tool", "force": [0, 0, 0]}, device={"force_limit": [15]})
+        hand={"body": "tool", "force": [0, 0, 0]},
+        device={"force_limit": [15]},
+    )
     run = simulate(scene, ImpulseAugmented(rendering="spread"))
-    assert run.v[-1, 0] == pytest.approx(leaves_with, abs=5e-5) and steps in (None, len(run.impacts.step))
+    assert run.v[-1, 0] == pytest.approx(leaves_with, abs=5e-5) and steps in (
+        None,
+        len(run.impacts.step),
+    )
 
 
-# --- what must change no bit -----------------------------------------------------------------------------------------
+# --- what must change no bit
+# -----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("e", [0.0, 0.3, 1.0])
 def test_equal_restitution_changes_no_bit_wherever_it_is_written(e: float) -> None:
-    plain, walls = simulate(PEG.with_values({"contact.restitution": e})), [wall.name for wall in PEG.walls]
+    plain, walls = (
+        simulate(PEG.with_values({"contact.restitution": e})),
+        [wall.name for wall in PEG.walls],
+    )
     of_walls = {f"walls.{name}.restitution": e for name in walls}
-    for values in (of_walls, {"bodies.peg.restitution": e}, of_walls | {"bodies.peg.restitution": e}):
+    for values in (
+        of_walls,
+        {"bodies.peg.restitution": e},
+        of_walls | {"bodies.peg.restitution": e},
+    ):
         own = simulate(PEG.with_values(values | {"contact.restitution": 0.5}))
-        assert np.array_equal(own.q, plain.q) and np.array_equal(own.impacts.impulse, plain.impacts.impulse)
+        assert np.array_equal(own.q, plain.q) and np.array_equal(
+            own.impacts.impulse, plain.impacts.impulse
+        )
 
 
 def test_friction_in_impacts_is_the_scenes_choice() -> None:
@@ -98,13 +143,15 @@ def test_friction_in_impacts_is_the_scenes_choice() -> None:
         assert ImpulseAugmented().within(scene).friction_in_impacts is (forces == "implicit")
 
 
-# --- energy over a run -----------------------------------------------------------------------------------------------
+# --- energy over a run
+# -----------------------------------------------------------------------------------------------
 
 BAR = shipped("bar_on_posts")
 
 
 def test_unequal_restitution_and_friction_in_one_impact() -> None:
-    """The bar on its posts, sliding: Poisson's normal impulses, Coulomb's friction; equalities gain 12 J here."""
+    """The bar on its posts, sliding: Poisson's normal impulses, Coulomb's friction; equalities gain
+    12 J here."""
     law = ImpulseAugmented(friction_in_impacts=True)
     run = simulate(BAR.with_values({"contact.friction": 0.5, "bodies.bar.velocity.0": 1.0}), law)
     found = run.impacts
@@ -112,7 +159,8 @@ def test_unequal_restitution_and_friction_in_one_impact() -> None:
     assert found.rows[0] == 2 and 0.0 <= found.v_plus[0, 0] < 1.0
 
 
-# --- orders ----------------------------------------------------------------------------------------------------------
+# --- orders
+# ----------------------------------------------------------------------------------------------------------
 
 PENDULUM = shipped("double_pendulum").with_values({"duration": 0.5})
 
@@ -136,11 +184,16 @@ def test_the_compiled_step_has_its_order_on_a_smooth_scene(integrator: str, orde
 
 @pytest.mark.parametrize("coupling", ["none", "four-channel"])
 @pytest.mark.parametrize("integrator", INTEGRATORS)
-def test_with_contacts_the_ledger_closes_as_the_step_goes_to_zero(integrator: str, coupling: str) -> None:
-    """Collisions, penalties, friction, hand and coupling: nothing is forgotten. Contacts leave order 1 at best."""
+def test_with_contacts_the_ledger_closes_as_the_step_goes_to_zero(
+    integrator: str, coupling: str
+) -> None:
+    """Collisions, penalties, friction, hand and coupling: nothing is forgotten. Contacts leave
+    order 1 at best."""
     residuals = []
     for rate in (1000, 8000):
-        scene = shipped("peg_corner").with_values(START | {"contact.coherence_distance": 1e-3, "rate": rate})
+        scene = shipped("peg_corner").with_values(
+            START | {"contact.coherence_distance": 1e-3, "rate": rate}
+        )
         ledger = simulate(scene, ImpulseAugmented(integrator), coupling_of(scene, coupling)).energy
         through = np.abs(ledger["hand_work"]).max() + np.abs(ledger["impact_loss"]).max()
         residuals.append(np.abs(ledger["integration_residual"]).max() / through)

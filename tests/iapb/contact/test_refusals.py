@@ -1,4 +1,5 @@
-"""What each border refuses, by the name of the wrong argument: impacts, many impacts, friction, laws."""
+"""What each border refuses, by the name of the wrong argument: impacts, many impacts, friction,
+laws."""
 
 from __future__ import annotations
 
@@ -15,57 +16,135 @@ from iapb.scene import find_scene, load_scene
 from iapb.system import System
 
 NAN, INF = float("nan"), float("inf")
-ONE = {"mass_matrix": [[2.0, 0.5], [0.5, 1.0]], "contact_jacobian": np.eye(2), "velocity": [-1.0, 2.0],
-       "restitution": 0.5}
-MANY = {"mass_matrices": np.array([np.eye(2)] * 3), "contact_jacobians": np.ones((3, 1, 2)),
-        "velocities": -np.ones((3, 2)), "restitution": 0.5}
+ONE = {
+    "mass_matrix": [[2.0, 0.5], [0.5, 1.0]],
+    "contact_jacobian": np.eye(2),
+    "velocity": [-1.0, 2.0],
+    "restitution": 0.5,
+}
+MANY = {
+    "mass_matrices": np.array([np.eye(2)] * 3),
+    "contact_jacobians": np.ones((3, 1, 2)),
+    "velocities": -np.ones((3, 2)),
+    "restitution": 0.5,
+}
 RUBBING = ONE | {"tangents": np.eye(2)[::-1], "friction": 0.3}
-BORDERS = {"one": (resolve_impact, ONE), "many": (resolve_impacts, MANY),
-           "friction": (resolve_frictional_impact, RUBBING)}
+BORDERS = {
+    "one": (resolve_impact, ONE),
+    "many": (resolve_impacts, MANY),
+    "friction": (resolve_frictional_impact, RUBBING),
+}
 
 MASSES: list[tuple[Any, str]] = [
-    ([[1.0, 0.0]], ""), ([], ""), (np.zeros((0, 0)), ""), (2.0, ""), ("heavy", ""), (np.eye(2) * (1 + 1j), ""),
-    (np.eye(2, dtype=bool), ""), ([["1", "0"], ["0", "1"]], ""), ([[10**400, 0], [0, 1]], "[0, 0]"),
-    (np.array([[1, True], [True, 2]], dtype=object), ""), ([[1.0, NAN], [NAN, 1.0]], "[0, 1]"),
-    ([[1.0, 0.0], [0.0, INF]], "[1, 1]"), ([[1.0, 0.2], [0.1, 1.0]], "[0, 1]"), ([[1.0, 0.0], [0.0, 0.0]], "[1, 1]"),
-    ([[1.0, 0.0], [0.0, -1.0]], "[1, 1]"), ([[-1.0, 0.0], [0.0, -2.0]], "[1, 1]"), ([[1.0, 3.0], [3.0, 1.0]], "[0, 1]"),
-    ([[1.0, -3.0], [-3.0, 1.0]], "[0, 1]"), ([[1.0, 1.1], [1.1, 1.0]], ""), ([[1.0, 1.0], [1.0, 1.0]], ""),
-    ([[1e-300, 1e300], [1e300, 1e-300]], "[0, 1]"), ([[1e-300, 1e300], [-1e300, 1e-300]], "[0, 1]"),
+    ([[1.0, 0.0]], ""),
+    ([], ""),
+    (np.zeros((0, 0)), ""),
+    (2.0, ""),
+    ("heavy", ""),
+    (np.eye(2) * (1 + 1j), ""),
+    (np.eye(2, dtype=bool), ""),
+    ([["1", "0"], ["0", "1"]], ""),
+    ([[10**400, 0], [0, 1]], "[0, 0]"),
+    (np.array([[1, True], [True, 2]], dtype=object), ""),
+    ([[1.0, NAN], [NAN, 1.0]], "[0, 1]"),
+    ([[1.0, 0.0], [0.0, INF]], "[1, 1]"),
+    ([[1.0, 0.2], [0.1, 1.0]], "[0, 1]"),
+    ([[1.0, 0.0], [0.0, 0.0]], "[1, 1]"),
+    ([[1.0, 0.0], [0.0, -1.0]], "[1, 1]"),
+    ([[-1.0, 0.0], [0.0, -2.0]], "[1, 1]"),
+    ([[1.0, 3.0], [3.0, 1.0]], "[0, 1]"),
+    ([[1.0, -3.0], [-3.0, 1.0]], "[0, 1]"),
+    ([[1.0, 1.1], [1.1, 1.0]], ""),
+    ([[1.0, 1.0], [1.0, 1.0]], ""),
+    ([[1e-300, 1e300], [1e300, 1e-300]], "[0, 1]"),
+    ([[1e-300, 1e300], [-1e300, 1e-300]], "[0, 1]"),
     ([[1.0, 2e-9], [0.0, 1.0]], "[0, 1]"),
 ]
 VELOCITIES: list[tuple[Any, str]] = [
-    ([1.0], ""), ([[1.0, 2.0]], ""), ([NAN, 1.0], "[0]"), ([1.0, -INF], "[1]"), (None, ""),
+    ([1.0], ""),
+    ([[1.0, 2.0]], ""),
+    ([NAN, 1.0], "[0]"),
+    ([1.0, -INF], "[1]"),
+    (None, ""),
     (np.array([1, 2], dtype="timedelta64[s]"), ""),
 ]
 ROWS: list[tuple[Any, str]] = [
-    ([[1.0]], ""), ([1.0, 2.0], ""), (np.zeros((3, 0)), ""), (np.zeros((0, 5)), ""), ([[1.0, 2.0], [3.0]], ""),
-    ([[1.0, INF], [0.0, 1.0]], "[0, 1]"), ([[1.0, 0.0], [NAN, 1.0]], "[1, 0]"),
+    ([[1.0]], ""),
+    ([1.0, 2.0], ""),
+    (np.zeros((3, 0)), ""),
+    (np.zeros((0, 5)), ""),
+    ([[1.0, 2.0], [3.0]], ""),
+    ([[1.0, INF], [0.0, 1.0]], "[0, 1]"),
+    ([[1.0, 0.0], [NAN, 1.0]], "[1, 0]"),
     (np.ma.masked_array([[1.0, 0.0]], [[False, True]]), ""),
 ]
-ONE_BY_ONE = [("mass_matrix", *each) for each in MASSES] + [("velocity", *each) for each in VELOCITIES] + [
-    ("contact_jacobian", *each) for each in ROWS]
+ONE_BY_ONE = (
+    [("mass_matrix", *each) for each in MASSES]
+    + [("velocity", *each) for each in VELOCITIES]
+    + [("contact_jacobian", *each) for each in ROWS]
+)
 REFUSED: list[tuple[str, str, Any, str]] = [
     *((border, *each) for border in ("one", "friction") for each in ONE_BY_ONE),
-    *(("one", "restitution", value, place) for value, place in (
-        (1.0000001, ""), (-1.0000001, ""), (NAN, ""), ("0.5", ""), (None, ""), ([0.5], ""), ([[0.5, 0.5]], ""),
-        (10**400, ""),
-        ([0.5, -0.1], "[1]"), ([1.1, 0.5], "[0]"), ([0.5, NAN], "[1]"), ([-2.0, -2.0], "[0]"),
-        (np.ma.masked_array([0.5, 0.5], [True, False]), ""))),
-    *((border, name, value, "") for border in ("one", "many") for name, values in (
-        ("clamp", ("no", 0)), ("budget", (-1, 1.5, True)), ("rank_tolerance", (0.0, 1.0, 2.0, NAN, "tight", [1e-8])),
-    ) for value in values),
+    *(
+        ("one", "restitution", value, place)
+        for value, place in (
+            (1.0000001, ""),
+            (-1.0000001, ""),
+            (NAN, ""),
+            ("0.5", ""),
+            (None, ""),
+            ([0.5], ""),
+            ([[0.5, 0.5]], ""),
+            (10**400, ""),
+            ([0.5, -0.1], "[1]"),
+            ([1.1, 0.5], "[0]"),
+            ([0.5, NAN], "[1]"),
+            ([-2.0, -2.0], "[0]"),
+            (np.ma.masked_array([0.5, 0.5], [True, False]), ""),
+        )
+    ),
+    *(
+        (border, name, value, "")
+        for border in ("one", "many")
+        for name, values in (
+            ("clamp", ("no", 0)),
+            ("budget", (-1, 1.5, True)),
+            ("rank_tolerance", (0.0, 1.0, 2.0, NAN, "tight", [1e-8])),
+        )
+        for value in values
+    ),
     *(("one", "method", value, "") for value in ("magic", ["factored"])),
-    *(("many", name, value, place) for name, value, place in (
-        ("mass_matrices", np.eye(2), ""), ("mass_matrices", np.ones((2, 2, 2)), ""),
-        ("mass_matrices", [np.eye(2), np.eye(2), [[1.0, 0.0], [0.0, NAN]]], "[2, 1, 1]"),
-        ("mass_matrices", [np.eye(2), np.ones((2, 2)), np.eye(2)], "[1]"),
-        ("contact_jacobians", np.ones((3, 1, 3)), ""), ("contact_jacobians", np.full((3, 1, 2), INF), "[0, 0, 0]"),
-        ("velocities", "fast", ""), ("velocities", [[0.0, 0.0], [0.0, NAN], [0.0, 0.0]], "[1, 1]"),
-        ("restitution", [0.5, 1.5, 0.5], "[1]"), ("restitution", NAN, ""), ("restitution", [0.5, 0.5], ""))),
-    *(("friction", name, value, "") for name, value in (
-        ("tangents", [[1.0, 0.0, 0.0]]), ("tangents", [[1.0, 0.0]]), ("tangents", [[NAN, 0.0], [0.0, 1.0]]),
-        ("tangents", np.ones((2, 3, 2))), ("friction", -0.1), ("friction", [0.1] * 3), ("friction", INF),
-        ("restitution", -0.5), ("restitution", [0.1]), ("restitution", 1.5))),
+    *(
+        ("many", name, value, place)
+        for name, value, place in (
+            ("mass_matrices", np.eye(2), ""),
+            ("mass_matrices", np.ones((2, 2, 2)), ""),
+            ("mass_matrices", [np.eye(2), np.eye(2), [[1.0, 0.0], [0.0, NAN]]], "[2, 1, 1]"),
+            ("mass_matrices", [np.eye(2), np.ones((2, 2)), np.eye(2)], "[1]"),
+            ("contact_jacobians", np.ones((3, 1, 3)), ""),
+            ("contact_jacobians", np.full((3, 1, 2), INF), "[0, 0, 0]"),
+            ("velocities", "fast", ""),
+            ("velocities", [[0.0, 0.0], [0.0, NAN], [0.0, 0.0]], "[1, 1]"),
+            ("restitution", [0.5, 1.5, 0.5], "[1]"),
+            ("restitution", NAN, ""),
+            ("restitution", [0.5, 0.5], ""),
+        )
+    ),
+    *(
+        ("friction", name, value, "")
+        for name, value in (
+            ("tangents", [[1.0, 0.0, 0.0]]),
+            ("tangents", [[1.0, 0.0]]),
+            ("tangents", [[NAN, 0.0], [0.0, 1.0]]),
+            ("tangents", np.ones((2, 3, 2))),
+            ("friction", -0.1),
+            ("friction", [0.1] * 3),
+            ("friction", INF),
+            ("restitution", -0.5),
+            ("restitution", [0.1]),
+            ("restitution", 1.5),
+        )
+    ),
 ]
 
 
@@ -78,10 +157,14 @@ def test_a_wrong_argument_is_named(border: str, argument: str, value: Any, place
     assert str(caught.value).startswith(f"{argument}{place} = ") and "expected" in str(caught.value)
 
 
-@pytest.mark.parametrize(("changed", "named"), [
-    ({"budget": 1, "restitution": [0.1, 0.2]}, "budget"), ({"budget": 1, "method": "poisson"}, "budget"),
-    ({"method": "poisson", "restitution": -0.1}, "restitution"),
-])
+@pytest.mark.parametrize(
+    ("changed", "named"),
+    [
+        ({"budget": 1, "restitution": [0.1, 0.2]}, "budget"),
+        ({"budget": 1, "method": "poisson"}, "budget"),
+        ({"method": "poisson", "restitution": -0.1}, "restitution"),
+    ],
+)
 def test_arguments_that_do_not_go_together(changed: dict[str, Any], named: str) -> None:
     with pytest.raises(ArgumentError) as caught:
         resolve_impact(**ONE | changed)  # type: ignore[arg-type]
@@ -90,8 +173,12 @@ def test_arguments_that_do_not_go_together(changed: dict[str, Any], named: str) 
 
 @pytest.mark.parametrize("value", [NAN, 2.0, -1.5])
 def test_a_wrong_restitution_of_no_impacts_is_refused_too(value: float) -> None:
-    empty = {"mass_matrices": np.zeros((0, 3, 3)), "contact_jacobians": np.zeros((0, 2, 3)),
-             "velocities": np.zeros((0, 3)), "restitution": 0.5}
+    empty = {
+        "mass_matrices": np.zeros((0, 3, 3)),
+        "contact_jacobians": np.zeros((0, 2, 3)),
+        "velocities": np.zeros((0, 3)),
+        "restitution": 0.5,
+    }
     assert resolve_impacts(**empty).velocity.shape == (0, 3)  # type: ignore[arg-type]
     with pytest.raises(ArgumentError, match="^restitution = "):
         resolve_impacts(**empty | {"restitution": value})  # type: ignore[arg-type]
@@ -101,7 +188,8 @@ HUGE = 1.7e308
 OVERFLOWS: list[tuple[Any, Any, Any, str]] = [
     ([[1.0, 0.9], [0.9, 1.0]], [[1.0, 0.0]], [HUGE, HUGE], "velocity"),
     (1e200 * np.eye(2), [[1.0, 0.0]], [-1e200, 0.0], "generalized_impulse"),
-    (np.eye(2), [[1e-300, 0.0]], [-1e100, 0.0], "impulses"), (np.eye(2), [[1.0, 0.3]], [-1e200, 0.0], "energy_change"),
+    (np.eye(2), [[1e-300, 0.0]], [-1e100, 0.0], "impulses"),
+    (np.eye(2), [[1.0, 0.3]], [-1e200, 0.0], "energy_change"),
 ]
 
 
@@ -117,10 +205,14 @@ def test_a_result_beyond_doubles_is_named(M: Any, J: Any, v: Any, quantity: str)
 
 @pytest.mark.parametrize("rows", [[], (), np.zeros(0), np.zeros((0, 2))])
 def test_no_rows_in_any_form_leave_the_velocity_as_it_is(rows: Any) -> None:
-    for found in (resolve_impact(**ONE | {"contact_jacobian": rows}),  # type: ignore[arg-type]
-                  resolve_frictional_impact(ONE["mass_matrix"], rows, rows, ONE["velocity"], 0.5, 0.3)):
+    for found in (
+        resolve_impact(**ONE | {"contact_jacobian": rows}),  # type: ignore[arg-type]
+        resolve_frictional_impact(ONE["mass_matrix"], rows, rows, ONE["velocity"], 0.5, 0.3),
+    ):
         assert np.array_equal(found.velocity, [-1.0, 2.0]) and found.impulses.shape == (0,)
-    assert resolve_impacts([ONE["mass_matrix"]], [], [ONE["velocity"]], 0.5).velocity.tolist() == [[-1.0, 2.0]]
+    assert resolve_impacts([ONE["mass_matrix"]], [], [ONE["velocity"]], 0.5).velocity.tolist() == [
+        [-1.0, 2.0]
+    ]
 
 
 def test_fractions_and_whole_numbers_in_object_arrays_are_numbers() -> None:
@@ -129,12 +221,16 @@ def test_fractions_and_whole_numbers_in_object_arrays_are_numbers() -> None:
     assert np.array_equal(found.velocity, resolve_impact(**ONE).velocity)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(("make", "values", "named"), [
-    (Penalty, {"integrator": "euler"}, "integrator"), (ImpulseAugmented, {"rendering": "clip"}, "rendering"),
-    (ImpulseAugmented, {"friction_in_impacts": "yes"}, "friction_in_impacts"),
-    (ImpulseAugmented, {"pushing": 1}, "pushing"),
-    (ImpulseAugmented, {"pushing": True, "friction_in_impacts": True}, "pushing"),
-])
+@pytest.mark.parametrize(
+    ("make", "values", "named"),
+    [
+        (Penalty, {"integrator": "euler"}, "integrator"),
+        (ImpulseAugmented, {"rendering": "clip"}, "rendering"),
+        (ImpulseAugmented, {"friction_in_impacts": "yes"}, "friction_in_impacts"),
+        (ImpulseAugmented, {"pushing": 1}, "pushing"),
+        (ImpulseAugmented, {"pushing": True, "friction_in_impacts": True}, "pushing"),
+    ],
+)
 def test_settings_of_a_law(make: Any, values: dict[str, Any], named: str) -> None:
     with pytest.raises(ArgumentError) as caught:
         make(**values)

@@ -1,4 +1,5 @@
-"""Resting contact: implicit forces make no energy at any stiffness, Coulomb's friction sticks, slides, dissipates."""
+"""Resting contact: implicit forces make no energy at any stiffness, Coulomb's friction sticks,
+slides, dissipates."""
 
 from __future__ import annotations
 
@@ -20,34 +21,71 @@ CREEP = 1e-10  # [m/s] docs/theory.md: slower slip sticks
 
 
 def sliders(seed: int, count: int | None = None, **contact: Any) -> Scene:
-    """Balls on a slide between two walls, some overlapping: K to 1e9, 100 Hz to 10 kHz, masses over 8 decades.
+    """Balls on a slide between two walls, some overlapping: K to 1e9, 100 Hz to 10 kHz, masses over
+    8 decades.
 
-    They move by about 1 mm in a step: faster ones could pass through each other, and their gaps would not be linear.
+    They move by about 1 mm in a step: faster ones could pass through each other, and their gaps
+    would not be linear.
     """
     rng = np.random.default_rng(seed)
     count, rate = count or int(rng.integers(1, 9)), float(10.0 ** rng.uniform(2.0, 4.0))
     places = np.cumsum(rng.uniform(0.0185, 0.0215, count))
-    bodies = [{"name": f"ball_{k}", "joint": "prismatic", "axis": [1, 0], "mass": float(10.0 ** rng.uniform(-5.0, 3.0)),
-               "shapes": [{"kind": "circle", "radius": 0.01}], "position": [float(x)],
-               "velocity": [float(rng.normal(scale=min(1.0, 1e-3 * rate)))]} for k, x in enumerate(places)]
-    walls = [{"name": f"wall_{side}", "kind": "half_plane", "normal": [-side, 0],
-              "point": [places[0 if side < 0 else -1] + side * (0.01 + rng.uniform(-1e-3, 1e-3)), 0]}
-             for side in (-1, 1)]
-    given = {"stiffness": float(10.0 ** rng.uniform(0.0, 9.0)),
-             "damping": float(rng.choice([0.0, 10.0 ** rng.uniform(-2.0, 6.0)]))}
+    bodies = [
+        {
+            "name": f"ball_{k}",
+            "joint": "prismatic",
+            "axis": [1, 0],
+            "mass": float(10.0 ** rng.uniform(-5.0, 3.0)),
+            "shapes": [{"kind": "circle", "radius": 0.01}],
+            "position": [float(x)],
+            "velocity": [float(rng.normal(scale=min(1.0, 1e-3 * rate)))],
+        }
+        for k, x in enumerate(places)
+    ]
+    walls = [
+        {
+            "name": f"wall_{side}",
+            "kind": "half_plane",
+            "normal": [-side, 0],
+            "point": [places[0 if side < 0 else -1] + side * (0.01 + rng.uniform(-1e-3, 1e-3)), 0],
+        }
+        for side in (-1, 1)
+    ]
+    given = {
+        "stiffness": float(10.0 ** rng.uniform(0.0, 9.0)),
+        "damping": float(rng.choice([0.0, 10.0 ** rng.uniform(-2.0, 6.0)])),
+    }
     return scene_of(bodies, walls, rate=rate, duration=60.0 / rate, contact=given | contact)
 
 
 def made(run: Run) -> tuple[float, float]:
-    """Return the largest gain of a step, and of the kinetic energy since the start, as shares of the energy there.
+    """Return the largest gain of a step, and of the kinetic energy since the start, as shares of
+    the energy there.
 
-    The gain of a step counts the springs of the contacts at its start alone: a contact found late, inside a wall, has
-    an energy that no step has made. Rounding of the gaps, 1e-16 m of 0.1 m, times K is taken off.
+    The gain of a step counts the springs of the contacts at its start alone: a contact found late,
+    inside a wall, has an energy that no step has made. Rounding of the gaps, 1e-16 m of 0.1 m,
+    times K is taken off.
     """
-    K, table, kinetic = run.scene_resolved["contact"]["stiffness"], run.contacts, run.energy["kinetic"]
-    pair = list(zip(table.body_a.tolist(), table.body_b.tolist(), np.sign(table.normal[:, 0]).tolist(), strict=True))
-    gaps = [{pair[i]: min(float(table.gap[i]), 0.0)
-             for i in range(table.offsets[k], table.offsets[k + 1])} for k in range(run.steps)]
+    K, table, kinetic = (
+        run.scene_resolved["contact"]["stiffness"],
+        run.contacts,
+        run.energy["kinetic"],
+    )
+    pair = list(
+        zip(
+            table.body_a.tolist(),
+            table.body_b.tolist(),
+            np.sign(table.normal[:, 0]).tolist(),
+            strict=True,
+        )
+    )
+    gaps = [
+        {
+            pair[i]: min(float(table.gap[i]), 0.0)
+            for i in range(table.offsets[k], table.offsets[k + 1])
+        }
+        for k in range(run.steps)
+    ]
     first = kinetic[0] + 0.5 * K * sum(gap**2 for gap in gaps[0].values())
     step = 0.0
     for k, (now, then) in enumerate(zip(gaps[:-1], gaps[1:], strict=True)):
@@ -63,7 +101,9 @@ def test_no_stiffness_rate_or_mass_makes_energy_where_gaps_are_linear(seed: int)
     run = simulate(sliders(seed), Penalty())
     step, start = made(run)
     assert run.complete and step < 1e-9
-    assert start < 1e-9 or run.distrust  # a light ball squeezed through a heavy one: its gap is not linear
+    assert (
+        start < 1e-9 or run.distrust
+    )  # a light ball squeezed through a heavy one: its gap is not linear
 
 
 def test_explicit_springs_do_make_energy_there() -> None:
@@ -74,17 +114,40 @@ def test_explicit_springs_do_make_energy_there() -> None:
 
 @pytest.mark.parametrize("seed", range(20))
 def test_implicit_forces_solve_the_complementarity_problem(seed: int) -> None:
-    """0 <= p ⟂ γ⁺ + (p/Δt + K φ)/(K Δt + B) >= 0 in a tower of boxes over nine decades of stiffness and of mass.
+    """0 <= p ⟂ γ⁺ + (p/Δt + K φ)/(K Δt + B) >= 0 in a tower of boxes over nine decades of stiffness
+    and of mass.
 
     In the first step: later ones know how the gaps bend (tests/iapb/contact/test_steps.py).
     """
     rng = np.random.default_rng(100 + seed)
-    bodies = [{"name": f"box_{k}", "joint": "planar", "mass": float(10.0 ** rng.uniform(-2, 2)), "inertia": 1e-2,
-               "shapes": [{"kind": "box", "size": [0.1, 0.1]}], "position": [0.04 * float(rng.uniform(-1, 1)) * k,
-               0.05 - 1e-4 + (0.1 - 1e-4) * k, 0.0]} for k in range(4)]
-    scene = scene_of(bodies, [FLOOR], gravity=[0.3, -9.81], duration=0.01, integrator="semi_implicit_euler", contact={
-        "stiffness": float(10.0 ** rng.uniform(2, 8)), "damping": float(10.0 ** rng.uniform(0, 4))})
-    run, m, h, K = simulate(scene, Penalty()), System(scene).mechanism, 1e-3, scene.contact.stiffness
+    bodies = [
+        {
+            "name": f"box_{k}",
+            "joint": "planar",
+            "mass": float(10.0 ** rng.uniform(-2, 2)),
+            "inertia": 1e-2,
+            "shapes": [{"kind": "box", "size": [0.1, 0.1]}],
+            "position": [0.04 * float(rng.uniform(-1, 1)) * k, 0.05 - 1e-4 + (0.1 - 1e-4) * k, 0.0],
+        }
+        for k in range(4)
+    ]
+    scene = scene_of(
+        bodies,
+        [FLOOR],
+        gravity=[0.3, -9.81],
+        duration=0.01,
+        integrator="semi_implicit_euler",
+        contact={
+            "stiffness": float(10.0 ** rng.uniform(2, 8)),
+            "damping": float(10.0 ** rng.uniform(0, 4)),
+        },
+    )
+    run, m, h, K = (
+        simulate(scene, Penalty()),
+        System(scene).mechanism,
+        1e-3,
+        scene.contact.stiffness,
+    )
     c, k, some = run.contacts, K * h + scene.contact.damping, 0
     for i in range(*c.offsets[:2]):
         J = m.point_jacobian(run.q[0], int(c.body_a[i]), c.point[i])
@@ -101,10 +164,22 @@ def test_implicit_forces_solve_the_complementarity_problem(seed: int) -> None:
 def on_slope(degrees: float, mu: float, v: float = 0.0, **contact: Any) -> Scene:
     """A box on a level floor, under tilted gravity, at speed v along it."""
     a, sag = math.radians(degrees), 5e-4 if "stiffness" in contact else 0.0
-    body = {"name": "box", "joint": "planar", "mass": 2.0, "inertia": 5e-3, "position": [0, 0.025 - sag, 0],
-            "velocity": [v, 0, 0], "shapes": [{"kind": "box", "size": [0.15, 0.05]}]}
-    return scene_of([body], [FLOOR], duration=1.0, gravity=[9.81 * math.sin(a), -9.81 * math.cos(a)],
-                    contact={"friction": mu, "coherence_distance": 2e-3} | contact)
+    body = {
+        "name": "box",
+        "joint": "planar",
+        "mass": 2.0,
+        "inertia": 5e-3,
+        "position": [0, 0.025 - sag, 0],
+        "velocity": [v, 0, 0],
+        "shapes": [{"kind": "box", "size": [0.15, 0.05]}],
+    }
+    return scene_of(
+        [body],
+        [FLOOR],
+        duration=1.0,
+        gravity=[9.81 * math.sin(a), -9.81 * math.cos(a)],
+        contact={"friction": mu, "coherence_distance": 2e-3} | contact,
+    )
 
 
 def test_implicit_friction_creeps_below_the_stated_speed() -> None:
@@ -120,28 +195,50 @@ def test_a_body_that_a_hand_holds_does_not_fall() -> None:
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 @pytest.mark.parametrize(("slope", "v"), [(20.0, 0.0), (0.0, 0.2), (20.0, -0.3)])
-def test_a_box_stops_and_sticks_under_every_integrator(integrator: str, slope: float, v: float) -> None:
+def test_a_box_stops_and_sticks_under_every_integrator(
+    integrator: str, slope: float, v: float
+) -> None:
     """After v² / 2a, a = μ g cos α, up the slope + g sin α."""
     run = simulate(on_slope(slope, 0.5, v), ImpulseAugmented(integrator=integrator))
     a = math.radians(slope)
     slows = 9.81 * (0.5 * math.cos(a) + math.sin(a) * (v < 0.0))
     late = run.q[800:, 0]
     assert np.ptp(late) < 1e-9 and np.abs(run.v[800:, 0]).max() < 1e-9
-    assert late[-1] == pytest.approx(math.copysign(0.5 * v**2 / slows, v), abs=1.5 * abs(v) * run.dt + 5e-5)
+    assert late[-1] == pytest.approx(
+        math.copysign(0.5 * v**2 / slows, v), abs=1.5 * abs(v) * run.dt + 5e-5
+    )
     assert np.diff(run.energy["friction_work"], prepend=0.0).max() <= 1e-15
 
 
-@pytest.mark.parametrize("masses", [(1.0, 1.0, 1.0, 1.0), (1e-3, 1e3, 1.0, 1e2), (1e3, 1e-3, 1e-3, 1.0)])
-def test_friction_takes_energy_whether_or_not_its_limits_have_settled(masses: tuple[float, ...]) -> None:
+@pytest.mark.parametrize(
+    "masses", [(1.0, 1.0, 1.0, 1.0), (1e-3, 1e3, 1.0, 1e2), (1e3, 1e-3, 1e-3, 1.0)]
+)
+def test_friction_takes_energy_whether_or_not_its_limits_have_settled(
+    masses: tuple[float, ...],
+) -> None:
     """A pile of a cuboid and balls on a floor; F_f never pushes along the slip."""
     shapes = [{"kind": "box", "size": [0.4, 0.4, 0.2]}, *[{"kind": "sphere", "radius": 0.1}] * 3]
     places = [[0, 0, 0.099], [-0.15, 0.02, 0.347], [0, 0.02, 0.297], [0.15, 0.02, 0.347]]
-    bodies = [{"name": f"b{k}", "joint": "free_flyer", "mass": m, "inertia": [0.01 * m, 0.02 * m, 0.03 * m],
-               "shapes": [shape], "position": [*place, 0, 0, 0, 1]}
-              for k, (m, shape, place) in enumerate(zip(masses, shapes, places, strict=True))]
+    bodies = [
+        {
+            "name": f"b{k}",
+            "joint": "free_flyer",
+            "mass": m,
+            "inertia": [0.01 * m, 0.02 * m, 0.03 * m],
+            "shapes": [shape],
+            "position": [*place, 0, 0, 0, 1],
+        }
+        for k, (m, shape, place) in enumerate(zip(masses, shapes, places, strict=True))
+    ]
     floor = {"name": "floor", "kind": "half_space", "point": [0, 0, 0], "normal": [0, 0, 1]}
-    scene = scene_of(bodies, [floor], gravity=[2, 1, -9.81], integrator="semi_implicit_euler", duration=0.02,
-                     contact={"stiffness": 2000, "damping": 5, "friction": 0.6})
+    scene = scene_of(
+        bodies,
+        [floor],
+        gravity=[2, 1, -9.81],
+        integrator="semi_implicit_euler",
+        duration=0.02,
+        contact={"stiffness": 2000, "damping": 5, "friction": 0.6},
+    )
     run = simulate(scene, Penalty())
     for after, force in zip(run.v[1:], run.friction_force, strict=True):
         assert force @ after <= 1e-12 * np.abs(force) @ np.abs(after)

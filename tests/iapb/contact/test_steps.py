@@ -1,4 +1,5 @@
-"""Every step of a run is the paper's: contacts, states, impulses, forces and motion, judged from the record alone."""
+"""Every step of a run is the paper's: contacts, states, impulses, forces and motion, judged from
+the record alone."""
 
 from __future__ import annotations
 
@@ -21,98 +22,202 @@ ROUNDING = 1e-9  # of sums of a few dozen products, in units of the largest
 
 
 def pit(space: bool, **contact: Any) -> Scene:
-    """Discs, rectangles and polygons (balls and cuboids) thrown into a pit with a floor and two slopes."""
+    """Discs, rectangles and polygons (balls and cuboids) thrown into a pit with a floor and two
+    slopes."""
     rng, n = np.random.default_rng(7), 3 if space else 2
-    kinds: list[Values] = [
-        {"kind": "box", "size": [0.2, 0.16, 0.12]}, {"kind": "sphere", "radius": 0.1, "center": [0.02, 0.0, 0.01]},
-    ] if space else [
-        {"kind": "box", "size": [0.2, 0.14]}, {"kind": "circle", "radius": 0.1, "center": [0.02, 0.01]},
-        {"kind": "polygon", "vertices": [[-0.1, -0.08], [0.12, -0.05], [0.03, 0.1]]},
-    ]
+    kinds: list[Values] = (
+        [
+            {"kind": "box", "size": [0.2, 0.16, 0.12]},
+            {"kind": "sphere", "radius": 0.1, "center": [0.02, 0.0, 0.01]},
+        ]
+        if space
+        else [
+            {"kind": "box", "size": [0.2, 0.14]},
+            {"kind": "circle", "radius": 0.1, "center": [0.02, 0.01]},
+            {"kind": "polygon", "vertices": [[-0.1, -0.08], [0.12, -0.05], [0.03, 0.1]]},
+        ]
+    )
     bodies = []
     for k in range(6):
         place = [0.24 * (k % 3 - 1), *([0.12 * (k % 2)] * space), 0.1 + 0.2 * (k // 3)]
         spin = rng.normal(size=3 if space else 1)
         turn = [*(0.6 * spin / np.linalg.norm(spin)), 0.8] if space else spin.tolist()
         mass = float(rng.uniform(0.5, 3.0))
-        bodies.append({
-            "name": f"b{k}", "joint": "free_flyer" if space else "planar", "mass": mass,
-            "inertia": (mass * rng.uniform(2e-3, 4e-3, 3)).tolist() if space else 3e-3 * mass,
-            "shapes": [kinds[k % len(kinds)]], "position": [*place, *turn],
-            "velocity": [*rng.normal(scale=0.5, size=n - 1), -1.0, *rng.normal(scale=3.0, size=len(spin))],
-        })
+        bodies.append(
+            {
+                "name": f"b{k}",
+                "joint": "free_flyer" if space else "planar",
+                "mass": mass,
+                "inertia": (mass * rng.uniform(2e-3, 4e-3, 3)).tolist() if space else 3e-3 * mass,
+                "shapes": [kinds[k % len(kinds)]],
+                "position": [*place, *turn],
+                "velocity": [
+                    *rng.normal(scale=0.5, size=n - 1),
+                    -1.0,
+                    *rng.normal(scale=3.0, size=len(spin)),
+                ],
+            }
+        )
     up = np.eye(n)[-1]
-    walls = [{"name": f"w{k}", "kind": "half_space" if space else "half_plane",
-              "point": (x * np.eye(n)[0]).tolist(), "normal": (up - x * np.eye(n)[0] * 2.0).tolist()}
-             for k, x in enumerate((0.0, 0.5, -0.5))]
+    walls = [
+        {
+            "name": f"w{k}",
+            "kind": "half_space" if space else "half_plane",
+            "point": (x * np.eye(n)[0]).tolist(),
+            "normal": (up - x * np.eye(n)[0] * 2.0).tolist(),
+        }
+        for k, x in enumerate((0.0, 0.5, -0.5))
+    ]
     given = {"forces": "paper", "stiffness": 3000, "damping": 5, "restitution": 0.4}
-    return paper.scene_of(bodies, walls, rate=500.0, duration=0.35, gravity=(-9.81 * up).tolist(),
-                          integrator="semi_implicit_euler", contact=given | contact)
+    return paper.scene_of(
+        bodies,
+        walls,
+        rate=500.0,
+        duration=0.35,
+        gravity=(-9.81 * up).tolist(),
+        integrator="semi_implicit_euler",
+        contact=given | contact,
+    )
 
 
 def swinging(damping: float = 0.2, **values: Any) -> Scene:
     """An arm with limits in its joints, damped, that strikes a slide, a disc and a wall."""
     joint = {"joint": "revolute", "mass": 1.0, "inertia": 5e-3, "center_of_mass": [0.15, 0.0]}
     bodies = [
-        joint | {"name": "upper", "joint_limits": [-0.4, 0.5], "joint_damping": [damping], "velocity": [2.0]},
-        joint | {"name": "fore", "parent": "upper", "origin": [0.3, 0.0], "joint_limits": [-0.3, 0.9],
-                 "velocity": [5.0], "shapes": [{"kind": "circle", "radius": 0.03, "center": [0.3, 0.0]}]},
-        {"name": "slide", "joint": "prismatic", "axis": [0, 1], "mass": 0.4, "origin": [0.65, -0.1],
-         "joint_limits": [-0.1, 0.05], "velocity": [1.0], "shapes": [{"kind": "box", "size": [0.2, 0.1]}]},
-        {"name": "disc", "joint": "planar", "mass": 0.5, "inertia": 1e-3, "position": [0.5, 0.45, 0.0],
-         "shapes": [{"kind": "circle", "radius": 0.05}]},
+        joint
+        | {
+            "name": "upper",
+            "joint_limits": [-0.4, 0.5],
+            "joint_damping": [damping],
+            "velocity": [2.0],
+        },
+        joint
+        | {
+            "name": "fore",
+            "parent": "upper",
+            "origin": [0.3, 0.0],
+            "joint_limits": [-0.3, 0.9],
+            "velocity": [5.0],
+            "shapes": [{"kind": "circle", "radius": 0.03, "center": [0.3, 0.0]}],
+        },
+        {
+            "name": "slide",
+            "joint": "prismatic",
+            "axis": [0, 1],
+            "mass": 0.4,
+            "origin": [0.65, -0.1],
+            "joint_limits": [-0.1, 0.05],
+            "velocity": [1.0],
+            "shapes": [{"kind": "box", "size": [0.2, 0.1]}],
+        },
+        {
+            "name": "disc",
+            "joint": "planar",
+            "mass": 0.5,
+            "inertia": 1e-3,
+            "position": [0.5, 0.45, 0.0],
+            "shapes": [{"kind": "circle", "radius": 0.05}],
+        },
     ]
     contact = {"forces": "paper", "stiffness": 3000, "damping": 5, "restitution": 0.5}
-    return paper.scene_of(bodies, [{"name": "wall", "kind": "half_plane", "point": [0, 0.55], "normal": [0.1, -1]}],
-                          rate=500.0, duration=0.6, gravity=[0, -9.81], integrator="semi_implicit_euler",
-                          contact=contact | values)
+    return paper.scene_of(
+        bodies,
+        [{"name": "wall", "kind": "half_plane", "point": [0, 0.55], "normal": [0.1, -1]}],
+        rate=500.0,
+        duration=0.6,
+        gravity=[0, -9.81],
+        integrator="semi_implicit_euler",
+        contact=contact | values,
+    )
 
 
 def shipped(name: str, **values: Any) -> Scene:
-    return load_scene(find_scene(name)).with_values({key.replace("__", "."): value for key, value in values.items()})
+    return load_scene(find_scene(name)).with_values(
+        {key.replace("__", "."): value for key, value in values.items()}
+    )
 
 
 def pushed_peg(**values: Any) -> Scene:
     """The peg driven fast into its corner, by a hand that asks for more than the device gives."""
-    start = {"bodies__peg__position": [0.0209, -0.0141, 0.08], "device__force_limit": [3, 3, 0.05], "duration": 0.6}
+    start = {
+        "bodies__peg__position": [0.0209, -0.0141, 0.08],
+        "device__force_limit": [3, 3, 0.05],
+        "duration": 0.6,
+    }
     return shipped("peg_corner", **start, contact__friction=0.1, **values)
 
 
 def held(scene: Scene) -> Scene:
-    """The third body in a hand, with a device so weak that the impulses of its whole group are scaled."""
-    return scene.with_values({"hand": {"body": "b2", "force": [0.5, 0, 0]}, "device": {"force_limit": [40, 30, 2]}})
+    """The third body in a hand, with a device so weak that the impulses of its whole group are
+    scaled."""
+    return scene.with_values(
+        {"hand": {"body": "b2", "force": [0.5, 0, 0]}, "device": {"force_limit": [40, 30, 2]}}
+    )
 
 
 def touching_row() -> Scene:
-    """Five discs in a row, struck: the gaps of four are zero to the last bit, so their contacts never had a force."""
-    bodies = [{"name": f"d{k}", "joint": "planar", "mass": 1.0, "inertia": 1e-4, "position": [0.03125 * k, 0, 0],
-               "shapes": [{"kind": "circle", "radius": 0.015625}]} for k in range(5)]
+    """Five discs in a row, struck: the gaps of four are zero to the last bit, so their contacts
+    never had a force."""
+    bodies = [
+        {
+            "name": f"d{k}",
+            "joint": "planar",
+            "mass": 1.0,
+            "inertia": 1e-4,
+            "position": [0.03125 * k, 0, 0],
+            "shapes": [{"kind": "circle", "radius": 0.015625}],
+        }
+        for k in range(5)
+    ]
     bodies[0] |= {"position": [-0.005, 0, 0], "velocity": [1, 0, 0]}
-    return paper.scene_of(bodies, [], contact={"forces": "paper", "stiffness": 1e4, "damping": 0, "restitution": 0.9})
+    return paper.scene_of(
+        bodies, [], contact={"forces": "paper", "stiffness": 1e4, "damping": 0, "restitution": 0.9}
+    )
 
 
 def each_its_own(scene: Scene, field: str) -> Scene:
     """Bodies and walls with values of their own, some with none."""
-    values = {f"bodies.{body.name}.{field}": (0.1, None, 1.0)[k % 3] for k, body in enumerate(scene.bodies)}
-    return scene.with_values(values | {f"walls.{wall.name}.{field}": (0.3, None)[k % 2]
-                                       for k, wall in enumerate(scene.walls)})
+    values = {
+        f"bodies.{body.name}.{field}": (0.1, None, 1.0)[k % 3]
+        for k, body in enumerate(scene.bodies)
+    }
+    return scene.with_values(
+        values
+        | {f"walls.{wall.name}.{field}": (0.3, None)[k % 2] for k, wall in enumerate(scene.walls)}
+    )
 
 
 CASES: dict[str, tuple[Scene, Any]] = {
-    "plane, two rows for two bodies": (pit(False, self_collision_rows="per_body"), ImpulseAugmented()),
+    "plane, two rows for two bodies": (
+        pit(False, self_collision_rows="per_body"),
+        ImpulseAugmented(),
+    ),
     "plane, friction": (each_its_own(pit(False, friction=0.4), "friction"), ImpulseAugmented()),
-    "plane, filters": (pit(False, cluster_distance=0.15, coherence_distance=0.03), ImpulseAugmented()),
-    "plane, as printed": (pit(False, penalty="printed", friction=0.5, damping=60, restitution=0), ImpulseAugmented()),
-    "plane, implicit, friction": (pit(False, forces="implicit", friction=0.4, damping=50, restitution=0),
-                                  ImpulseAugmented()),
+    "plane, filters": (
+        pit(False, cluster_distance=0.15, coherence_distance=0.03),
+        ImpulseAugmented(),
+    ),
+    "plane, as printed": (
+        pit(False, penalty="printed", friction=0.5, damping=60, restitution=0),
+        ImpulseAugmented(),
+    ),
+    "plane, implicit, friction": (
+        pit(False, forces="implicit", friction=0.4, damping=50, restitution=0),
+        ImpulseAugmented(),
+    ),
     "plane, penalties": (pit(False, friction=0.3), Penalty()),
     "plane, slow approach rests": (pit(False, approach_velocity=0.3), ImpulseAugmented()),
     "plane, unequal": (each_its_own(pit(False), "restitution"), ImpulseAugmented()),
     "plane, pushing": (pit(False, friction=0.4), ImpulseAugmented(pushing=True)),
-    "plane, impact friction": (each_its_own(pit(False, friction=0.3), "friction"),
-                               ImpulseAugmented(friction_in_impacts=True)),
+    "plane, impact friction": (
+        each_its_own(pit(False, friction=0.3), "friction"),
+        ImpulseAugmented(friction_in_impacts=True),
+    ),
     "space": (pit(True, friction=0.4), ImpulseAugmented()),
-    "space, implicit": (pit(True, forces="implicit", friction=0.4, restitution=0), ImpulseAugmented()),
+    "space, implicit": (
+        pit(True, forces="implicit", friction=0.4, restitution=0),
+        ImpulseAugmented(),
+    ),
     "space, unequal": (each_its_own(pit(True), "restitution"), ImpulseAugmented()),
     "space, impact friction": (pit(True, friction=0.3), ImpulseAugmented(friction_in_impacts=True)),
     "arm": (swinging(friction=0.3), ImpulseAugmented()),
@@ -131,26 +236,63 @@ CASES: dict[str, tuple[Scene, Any]] = {
 class Step:
     """One step of a run: its contacts, their rows and what the paper says of them."""
 
-    def __init__(self, system: System, law: Any, run: Run, k: int, before: list[paper.Contact], spreading: set[int],
-                 expected: dict[Any, float]) -> None:
-        self.expected, self.linear = expected, dict[Any, float]()  # gaps by name, as they were linear over the step
+    def __init__(
+        self,
+        system: System,
+        law: Any,
+        run: Run,
+        k: int,
+        before: list[paper.Contact],
+        spreading: set[int],
+        expected: dict[Any, float],
+    ) -> None:
+        self.expected, self.linear = (
+            expected,
+            dict[Any, float](),
+        )  # gaps by name, as they were linear over the step
         self.system, self.law, self.run, self.k, self.m = system, law, run, k, system.mechanism
         self.scene, self.q, self.v = system.scene, run.q[k], run.v[k]
-        self.table = {name: getattr(run.contacts, name)[slice(*run.contacts.offsets[k : k + 2])] for name in (
-            "body_a", "body_b", "point", "normal", "gap", "normal_velocity", "normal_force", "friction_force",
-            "impulse", "is_new")}
+        self.table = {
+            name: getattr(run.contacts, name)[slice(*run.contacts.offsets[k : k + 2])]
+            for name in (
+                "body_a",
+                "body_b",
+                "point",
+                "normal",
+                "gap",
+                "normal_velocity",
+                "normal_force",
+                "friction_force",
+                "impulse",
+                "is_new",
+            )
+        }
         found = paper.contacts_of(system, self.q)
-        assert [c.bodies for c in found] == list(zip(self.table["body_a"], self.table["body_b"], strict=True))
+        assert [c.bodies for c in found] == list(
+            zip(self.table["body_a"], self.table["body_b"], strict=True)
+        )
         np.testing.assert_allclose(self.table["gap"], [c.gap for c in found], atol=1e-14)
-        self.contacts = [c if c.stop is None else c._replace(point=point, normal=normal) for c, point, normal in zip(
-            found, self.table["point"], self.table["normal"], strict=True)]
+        self.contacts = [
+            c if c.stop is None else c._replace(point=point, normal=normal)
+            for c, point, normal in zip(
+                found, self.table["point"], self.table["normal"], strict=True
+            )
+        ]
         self.jacobians = [paper.relative_jacobian(self.m, self.q, c) for c in self.contacts]
         for i, (c, J) in enumerate(zip(self.contacts, self.jacobians, strict=True)):
-            np.testing.assert_array_equal((c.point, c.normal), (self.table["point"][i], self.table["normal"][i]))
+            np.testing.assert_array_equal(
+                (c.point, c.normal), (self.table["point"][i], self.table["normal"][i])
+            )
             if c.stop is not None:  # a stop's row is the velocity of its joint alone
-                np.testing.assert_allclose(c.normal @ J, c.stop[0] * np.eye(self.m.nv)[c.stop[1]], atol=1e-12)
-        self.speeds = np.array([c.normal @ J @ self.v for c, J in zip(self.contacts, self.jacobians, strict=True)])
-        self.new = [paper.is_new(c, before, self.scene.contact.coherence_distance) for c in self.contacts]
+                np.testing.assert_allclose(
+                    c.normal @ J, c.stop[0] * np.eye(self.m.nv)[c.stop[1]], atol=1e-12
+                )
+        self.speeds = np.array(
+            [c.normal @ J @ self.v for c, J in zip(self.contacts, self.jacobians, strict=True)]
+        )
+        self.new = [
+            paper.is_new(c, before, self.scene.contact.coherence_distance) for c in self.contacts
+        ]
         self.set_states(spreading)
 
     def of(self, groups: Any, c: paper.Contact) -> int:
@@ -159,13 +301,20 @@ class Step:
         return int(groups[tree]) if tree >= 0 else -1
 
     def set_states(self, spreading: set[int]) -> None:
-        """A group collides if a new contact approaches, or any while an impulse is being spread; then all that do."""
+        """A group collides if a new contact approaches, or any while an impulse is being spread;
+        then all that do."""
         self.group = paper.linked(self.m, self.contacts)
         of = [self.of(self.group, c) for c in self.contacts]
         near = self.speeds < -self.scene.contact.approach_velocity
         spreads = {self.group[tree] for tree in spreading}
-        struck = {g for i, g in enumerate(of) if self.law.impulses and near[i] and (self.new[i] or g in spreads)}
-        self.states = [COLLIDING if g in struck else RESTING if g in of else FREE for g in self.group]
+        struck = {
+            g
+            for i, g in enumerate(of)
+            if self.law.impulses and near[i] and (self.new[i] or g in spreads)
+        }
+        self.states = [
+            COLLIDING if g in struck else RESTING if g in of else FREE for g in self.group
+        ]
         self.collides = [i for i, g in enumerate(of) if g in struck and near[i]]
 
     def check_set(self) -> None:
@@ -181,14 +330,18 @@ class Step:
         for i in chosen:
             c, both = self.contacts[i], self.scene.contact.self_collision_rows == "per_body"
             if both and c.bodies[1] >= 0 and c.stop is None:
-                rows += [c.normal @ self.m.point_jacobian(self.q, body, c.point) for body in c.bodies]
+                rows += [
+                    c.normal @ self.m.point_jacobian(self.q, body, c.point) for body in c.bodies
+                ]
                 owner += [i, i]
             else:
                 rows.append(c.normal @ self.jacobians[i])
                 owner.append(i)
         return np.array(rows).reshape(-1, self.m.nv), owner
 
-    def resolved(self, J: np.ndarray, M: np.ndarray, v: np.ndarray, chosen: list[int], dofs: Any, line: int) -> Any:
+    def resolved(
+        self, J: np.ndarray, M: np.ndarray, v: np.ndarray, chosen: list[int], dofs: Any, line: int
+    ) -> Any:
         """(v⁺, p, friction share, solved): by (20)-(21), Poisson's law or with friction.
 
         With implicit contact several contacts only push, and those that push meet −e γ⁻.
@@ -202,8 +355,12 @@ class Step:
             return after, p, log.friction_share[line], log.solved[line]
         if self.law.friction_in_impacts:
             space = paper.in_space(self.scene)
-            T = np.array([paper.tangents_of(self.contacts[i].normal, space) @ self.jacobians[i][:, dofs]
-                          for i in chosen])
+            T = np.array(
+                [
+                    paper.tangents_of(self.contacts[i].normal, space) @ self.jacobians[i][:, dofs]
+                    for i in chosen
+                ]
+            )
             found = resolve_frictional_impact(M, J, T, v, e[0], [value[1] for value in values])
             return found.velocity, found.impulses, found.friction_share, found.status == "complete"
         if self.only_push(chosen) or len(set(e)) > 1:
@@ -215,13 +372,26 @@ class Step:
         return self.law.pushing or self.scene.contact.forces == "implicit" and len(chosen) > 1
 
     def check_impulses(self) -> tuple[np.ndarray, set[int]]:
-        """Every line of the step's impacts; return v⁺ and the trees with an impulse still to be spread."""
-        scales = getattr(self.law, "rendering", "full") in ("scale", "spread") and self.scene.device is not None
-        island = self.group if scales else paper.linked(self.m, [self.contacts[i] for i in self.collides])
+        """Every line of the step's impacts; return v⁺ and the trees with an impulse still to be
+        spread."""
+        scales = (
+            getattr(self.law, "rendering", "full") in ("scale", "spread")
+            and self.scene.device is not None
+        )
+        island = (
+            self.group
+            if scales
+            else paper.linked(self.m, [self.contacts[i] for i in self.collides])
+        )
         roots = sorted({self.of(island, self.contacts[i]) for i in self.collides})
         log, lines = self.run.impacts, np.flatnonzero(self.run.impacts.step == self.k)
         assert log.group[lines].tolist() == roots
-        v_plus, impulse, spreading, p_of = self.v.copy(), np.zeros(self.m.nv), set[int](), np.zeros(len(self.contacts))
+        v_plus, impulse, spreading, p_of = (
+            self.v.copy(),
+            np.zeros(self.m.nv),
+            set[int](),
+            np.zeros(len(self.contacts)),
+        )
         for line, root in zip(lines, roots, strict=True):
             trees = [t for t, first in enumerate(island) if first == root]
             dofs = np.concatenate([np.arange(*self.m.tree_dofs[t]) for t in trees])
@@ -244,28 +414,38 @@ class Step:
             for row, i in enumerate(owner):
                 if row == 0 or owner[row - 1] != i:  # of two rows that on body a
                     p_of[i] = share * p[row]
-            np.testing.assert_allclose(log.impulse[line, dofs], impulse[dofs], atol=ROUNDING * size * np.abs(M).max())
+            np.testing.assert_allclose(
+                log.impulse[line, dofs], impulse[dofs], atol=ROUNDING * size * np.abs(M).max()
+            )
             lost = 0.5 * (v @ M @ v - v_plus[dofs] @ M @ v_plus[dofs])
             assert log.energy_lost[line] == pytest.approx(lost, abs=ROUNDING * (v @ M @ v))
             assert log.energy_lost[line] >= -1e-14 * (v @ M @ v)
             assert (log.rows[line], log.solved[line]) == (len(J), solved)
             assert log.scale[line] == pytest.approx(share, rel=1e-12)
-            assert (log.clamp[line], log.friction_share[line]) == pytest.approx((1.0, kept), abs=1e-6)
+            assert (log.clamp[line], log.friction_share[line]) == pytest.approx(
+                (1.0, kept), abs=1e-6
+            )
             slow = J @ v_plus[dofs] + self.scene.contact.approach_velocity
-            assert log.approaching[line] == np.count_nonzero(slow < 0.0) or np.abs(slow).min() < 1e-9
+            assert (
+                log.approaching[line] == np.count_nonzero(slow < 0.0) or np.abs(slow).min() < 1e-9
+            )
         size = np.abs(impulse).max(initial=1e-3)
         np.testing.assert_allclose(self.run.impulse[self.k], impulse, atol=ROUNDING * size)
         pushed = np.zeros(self.m.nv)
         for i, c in enumerate(self.contacts):  # where p is not unique, its effect is
             pushed += self.table["impulse"][i] * (c.normal @ self.jacobians[i])
-        if self.scene.contact.self_collision_rows == "relative" and not self.law.friction_in_impacts:
+        if (
+            self.scene.contact.self_collision_rows == "relative"
+            and not self.law.friction_in_impacts
+        ):
             np.testing.assert_allclose(pushed, impulse, atol=ROUNDING * size)
         if not (self.only_push(self.collides) or self.law.friction_in_impacts):
             np.testing.assert_allclose(self.table["impulse"], p_of, atol=1e-7 * size)
         return v_plus, spreading
 
     def check_forces(self, v_plus: np.ndarray) -> None:
-        """(5), (6) at what does not collide; or the implicit forces and Coulomb's law at the end of the step."""
+        """(5), (6) at what does not collide; or the implicit forces and Coulomb's law at the end of
+        the step."""
         given, after = self.scene.contact, self.run.v[self.k + 1]
         penalty, friction, h = np.zeros(self.m.nv), np.zeros(self.m.nv), self.system.dt
         for i, (c, J) in enumerate(zip(self.contacts, self.jacobians, strict=True)):
@@ -287,11 +467,15 @@ class Step:
                 np.testing.assert_allclose(drag, explicit, atol=ROUNDING * size)
                 continue
             slip, limit = J @ after - (c.normal @ J @ after) * c.normal, mu * max(normal, 0.0)
-            assert np.linalg.norm(drag) <= limit * (1.0 + 2e-3) and abs(drag @ c.normal) < 1e-9 * size
+            assert (
+                np.linalg.norm(drag) <= limit * (1.0 + 2e-3) and abs(drag @ c.normal) < 1e-9 * size
+            )
             if np.linalg.norm(drag) < 0.99 * limit:
                 assert np.linalg.norm(slip) <= STICKS
             elif np.linalg.norm(slip) > 20.0 * STICKS:
-                np.testing.assert_allclose(drag, -limit * slip / np.linalg.norm(slip), atol=2e-2 * limit)
+                np.testing.assert_allclose(
+                    drag, -limit * slip / np.linalg.norm(slip), atol=2e-2 * limit
+                )
         np.testing.assert_allclose(self.run.penalty_force[self.k], penalty, atol=1e-6)
         damped = np.zeros(self.m.nv)
         for start, body in zip(self.m.arrays.v_start, self.scene.bodies, strict=True):
@@ -308,11 +492,15 @@ class Step:
     def check_motion(self, v_plus: np.ndarray) -> None:
         """(7) with the record's forces, by semi-implicit Euler."""
         h, run, k = self.system.dt, self.run, self.k
-        force = run.hand_force[k] + run.coupling_force[k] + run.penalty_force[k] + run.friction_force[k]
+        force = (
+            run.hand_force[k] + run.coupling_force[k] + run.penalty_force[k] + run.friction_force[k]
+        )
         force = force - self.m.gravity(self.q, self.system.gravity) - self.m.bias(self.q, v_plus)
         after = v_plus + h * np.linalg.solve(self.m.mass_matrix(self.q), force)
         q = self.m.integrate(self.q, after, h)
-        close = 1e-5 if self.scene.contact.forces == "implicit" else ROUNDING  # Newton's method ends at 1e-14 of energy
+        close = (
+            1e-5 if self.scene.contact.forces == "implicit" else ROUNDING
+        )  # Newton's method ends at 1e-14 of energy
         np.testing.assert_allclose(run.v[k + 1], after, atol=close * max(1.0, np.abs(after).max()))
         np.testing.assert_allclose(run.q[k + 1], q, atol=h * close * max(1.0, np.abs(after).max()))
 
@@ -321,7 +509,12 @@ class Step:
 def test_every_step_is_the_papers(name: str) -> None:
     scene, law = CASES[name]
     run, system = simulate(scene, law), System(scene)
-    law, before, spreading, seen = law.within(system.scene), list[paper.Contact](), set[int](), set[int]()
+    law, before, spreading, seen = (
+        law.within(system.scene),
+        list[paper.Contact](),
+        set[int](),
+        set[int](),
+    )
     expected = dict[Any, float]()
     assert run.complete
     for k in range(run.steps):

@@ -18,7 +18,8 @@ FAR = load_scene(find_scene("peg_corner")).with_values({"bodies.peg.position": [
 
 
 def pair_energies(damping, steps):
-    """Energy of tool, device and the spring between them [J], no hand, started 2 cm and 0.1 rad apart."""
+    """Energy of tool, device and the spring between them [J], no hand, started 2 cm and 0.1 rad
+    apart."""
     simulation = Simulation(FAR.with_values({"hand.force": [0, 0, 0]}), Penalty(), FOUR_CHANNEL)
     state, port = simulation.state, simulation.port
     port.device_q[:] += [0.02, -0.01, 0.1]
@@ -27,7 +28,9 @@ def pair_energies(damping, steps):
     for _ in range(steps):
         stretch, mass = port.device_q - state.q, state.mass_matrix
         kinetic = state.v @ mass @ state.v + port.device_v @ mass @ port.device_v
-        energies.append(0.5 * (kinetic + np.sum(np.multiply(FOUR_CHANNEL.stiffness, stretch * stretch))))
+        energies.append(
+            0.5 * (kinetic + np.sum(np.multiply(FOUR_CHANNEL.stiffness, stretch * stretch)))
+        )
         simulation.step()
     return np.array(energies)
 
@@ -53,8 +56,14 @@ def test_in_free_motion_tool_and_device_go_together(coupling):
 
 
 def test_couplings_say_what_they_are():
-    assert FOUR_CHANNEL.settings == {"stiffness": [100.0, 100.0, 0.5], "damping": [70.0, 70.0, 0.375]}
-    assert NoCoupling().settings == {} and len({NoCoupling.name, FourChannel.name, UnilateralCoupler.name}) == 3
+    assert FOUR_CHANNEL.settings == {
+        "stiffness": [100.0, 100.0, 0.5],
+        "damping": [70.0, 70.0, 0.375],
+    }
+    assert (
+        NoCoupling().settings == {}
+        and len({NoCoupling.name, FourChannel.name, UnilateralCoupler.name}) == 3
+    )
     with pytest.raises(ArgumentError, match="stiffness"):
         UnilateralCoupler((-1.0,), (1.0,))
     for gains in ((1.0,), (np.nan, 1.0), (np.inf, 1.0), (-1.0, 1.0)):

@@ -39,21 +39,29 @@ def test_momentum_changes_by_the_impulse_of_the_forces(forces):
 
 @given(forces, st.integers(0, 5))
 def test_delay_shifts_forces_and_readings_by_its_steps(forces, delay):
-    late, prompt = SimulatedDevice(MASS, REST, dt=DT, delay=delay), SimulatedDevice(MASS, REST, dt=DT)
+    late, prompt = (
+        SimulatedDevice(MASS, REST, dt=DT, delay=delay),
+        SimulatedDevice(MASS, REST, dt=DT),
+    )
     history = [prompt.q]
     for force in forces:
         late.apply(force)
     for force in forces[: max(len(forces) - delay, 0)]:
         prompt.apply(force)
         history.append(prompt.q)
-    assert late.q == pytest.approx(history[-1], abs=0.0)  # the device does what it was told `delay` steps ago
+    assert late.q == pytest.approx(
+        history[-1], abs=0.0
+    )  # the device does what it was told `delay` steps ago
     assert late.read().q == pytest.approx(history[max(len(history) - 1 - delay, 0)], abs=0.0)
 
 
 @given(forces)
 def test_actuators_clip_and_the_hand_does_not(forces):
     limit = np.array([15.0, 15.0, 1.0])
-    device, clipped = SimulatedDevice(MASS, REST, dt=DT, force_limit=limit), SimulatedDevice(MASS, REST, dt=DT)
+    device, clipped = (
+        SimulatedDevice(MASS, REST, dt=DT, force_limit=limit),
+        SimulatedDevice(MASS, REST, dt=DT),
+    )
     device.hand_force = clipped.hand_force = np.array([50.0, 0.0, 0.0])
     for force in forces:
         device.apply(force)
@@ -69,7 +77,9 @@ def test_a_reading_is_a_multiple_of_the_resolution_and_half_a_step_off_at_most(s
     assert np.abs(read.q[:2] - device.q[:2]).max() <= 0.5 * step * (1.0 + 1e-9)
     assert read.q[:2] / step == pytest.approx(np.round(read.q[:2] / step), abs=1e-6)
     assert read.q[2] == device.q[2] and read.v[2] == device.v[2]
-    assert np.abs(read.v[:2] - device.v[:2]).max() <= step / DT * (1.0 + 1e-9)  # it jumps by one step at most
+    assert np.abs(read.v[:2] - device.v[:2]).max() <= step / DT * (
+        1.0 + 1e-9
+    )  # it jumps by one step at most
 
 
 GAINS = (100.0, 80.0, 0.5), (70.0, 60.0, 0.375)
@@ -77,7 +87,8 @@ GAINS = (100.0, 80.0, 0.5), (70.0, 60.0, 0.375)
 
 def system_of(center: str, damping: str = "[0, 0, 0]") -> System:
     """Two discs that overlap each other all the time, a tool that is the third body, and a wall."""
-    return System(scene_from_text(f"""
+    return System(
+        scene_from_text(f"""
 name: three
 rate: 100
 duration: 1.0
@@ -94,16 +105,22 @@ walls: [{{name: floor, kind: half_plane, point: [0, -0.5], normal: [0, 1]}}]
 contact: {{stiffness: 500}}
 hand: {{body: tool, force: [0, 0, 0]}}
 device: {{force_limit: [3, 2, 0.1], damping: {damping}}}
-"""))
+""")
+    )
 
 
 @pytest.mark.parametrize("center", ["[0, 0]", "[0.3, -0.2]"])
 @pytest.mark.parametrize("damping", [(0.0, 0.0, 0.0), (0.5, 2.0, 0.3)])
 def test_the_device_obeys_its_equation_of_motion(center: str, damping: tuple[float, ...]) -> None:
-    """M(q) a + B(q, v) = F_hand + F_actuators − b v; the new velocity moves it; the clock counts the step."""
+    """M(q) a + B(q, v) = F_hand + F_actuators − b v; the new velocity moves it; the clock counts
+    the step."""
     system, rng = system_of(center, str(list(damping))), np.random.default_rng(0)
     port = system.make_port(FourChannel(*GAINS))
-    device, world, state = system.device_mechanism(), system.world_under(Penalty()), system.make_state()
+    device, world, state = (
+        system.device_mechanism(),
+        system.world_under(Penalty()),
+        system.make_state(),
+    )
     for step in range(5):
         q = device.integrate(device.neutral(), rng.normal(size=3))
         v, hand, actuators = rng.normal(size=(3, 3))
@@ -129,7 +146,10 @@ def test_the_coupler_is_on_while_the_tool_touches_or_the_device_is_inside_someth
     for _ in range(60):
         state.q[6:], state.v[:] = rng.normal(size=3), rng.normal(size=9)
         start = (4.9, 0.0) if rng.random() < 0.3 else (0.0, -0.3)
-        port.device_q[:], port.device_v[:] = [*(start + 0.3 * rng.normal(size=2)), rng.normal()], rng.normal(size=3)
+        port.device_q[:], port.device_v[:] = (
+            [*(start + 0.3 * rng.normal(size=2)), rng.normal()],
+            rng.normal(size=3),
+        )
         at_device = state.q.copy()
         at_device[6:] = port.device_q
         found = system.contacts_at(at_device)
@@ -146,10 +166,14 @@ def test_the_coupler_is_on_while_the_tool_touches_or_the_device_is_inside_someth
     assert len(seen) == 4
 
 
-PEG = load_scene(find_scene("peg_corner")).with_values({
-    "bodies.peg.position": [0.0209, -0.0141, 0.08], "contact.friction": 0.1, "device.force_limit": [3, 3, 0.05],
-    "device.damping": [0.5, 0.5, 0],
-})
+PEG = load_scene(find_scene("peg_corner")).with_values(
+    {
+        "bodies.peg.position": [0.0209, -0.0141, 0.08],
+        "contact.friction": 0.1,
+        "device.force_limit": [3, 3, 0.05],
+        "device.damping": [0.5, 0.5, 0],
+    }
+)
 STEPS = 350  # past the fourth collision
 LAW = ImpulseAugmented(rendering="saturate")
 
@@ -159,8 +183,16 @@ def device_of(scene):
     system, device = System(scene), scene.device
     q, v = system.start
     mass = system.device_mechanism().mass_matrix(q)
-    return SimulatedDevice(mass, q, v, dt=system.dt, damping=device.damping, force_limit=device.force_limit,
-                           delay=device.delay, resolution=device.position_resolution or 0.0)  # fmt: skip
+    return SimulatedDevice(
+        mass,
+        q,
+        v,
+        dt=system.dt,
+        damping=device.damping,
+        force_limit=device.force_limit,
+        delay=device.delay,
+        resolution=device.position_resolution or 0.0,
+    )
 
 
 def run_with(scene, coupling, device):
@@ -171,9 +203,14 @@ def run_with(scene, coupling, device):
     return recorder.run("", "")
 
 
-# Unilateral, the compiled device carries the free tool without delay and sensors: that a real one cannot.
-CASES = [("four-channel", {}), ("unilateral", {}), ("four-channel", {"device.delay": 2}),
-         ("four-channel", {"device.position_resolution": [1e-5, 1e-5, 0]})]
+# Unilateral, the compiled device carries the free tool without delay and sensors: that a real one
+# cannot.
+CASES = [
+    ("four-channel", {}),
+    ("unilateral", {}),
+    ("four-channel", {"device.delay": 2}),
+    ("four-channel", {"device.position_resolution": [1e-5, 1e-5, 0]}),
+]
 
 
 @pytest.mark.parametrize(("coupling", "values"), CASES, ids=str)

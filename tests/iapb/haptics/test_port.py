@@ -1,4 +1,5 @@
-"""Forces of the hand, of the coupling and of the actuators on a tool that may stand behind other bodies."""
+"""Forces of the hand, of the coupling and of the actuators on a tool that may stand behind other
+bodies."""
 
 from __future__ import annotations
 
@@ -15,7 +16,9 @@ from iapb.system import System
 
 ARM, PEG = (load_scene(find_scene(name)) for name in ("arm_pushing", "peg_hole_space"))
 _BODIES = ARM.resolved()["bodies"]
-BEHIND = ARM.with_values({"bodies": [_BODIES[2], *_BODIES[:2]]})  # the arm in the hand is the second tree
+BEHIND = ARM.with_values(
+    {"bodies": [_BODIES[2], *_BODIES[:2]]}
+)  # the arm in the hand is the second tree
 
 
 def started(scene: Scene, kind: Any = FourChannel) -> Any:
@@ -23,7 +26,11 @@ def started(scene: Scene, kind: Any = FourChannel) -> Any:
     system, rng = System(scene), np.random.default_rng(4)
     size = system.tool_dofs[1] - system.tool_dofs[0]
     port = system.make_port(kind(rng.uniform(50.0, 100.0, size), rng.uniform(50.0, 70.0, size)))
-    world, state, device = system.world_under(ImpulseAugmented()), system.make_state(), system.device_mechanism()
+    world, state, device = (
+        system.world_under(ImpulseAugmented()),
+        system.make_state(),
+        system.device_mechanism(),
+    )
     state.q[:] = system.mechanism.integrate(state.q, rng.normal(size=system.mechanism.nv))
     port.device_q[:] = device.integrate(port.device_q, rng.normal(size=size))
     state.v[:], port.device_v[:] = rng.normal(size=system.mechanism.nv), rng.normal(size=size)
@@ -32,17 +39,24 @@ def started(scene: Scene, kind: Any = FourChannel) -> Any:
 
 
 @pytest.mark.parametrize("scene", [BEHIND, PEG], ids=["plane", "space"])
-def test_the_hand_does_the_work_of_its_wrench_at_the_held_point_of_tool_and_device(scene: Scene) -> None:
-    """J_hᵀF_h · v = F · v_point + torque · ω for every velocity, each at its own pose; channels push by K Δq + B Δv."""
+def test_the_hand_does_the_work_of_its_wrench_at_the_held_point_of_tool_and_device(
+    scene: Scene,
+) -> None:
+    """J_hᵀF_h · v = F · v_point + torque · ω for every velocity, each at its own pose; channels
+    push by K Δq + B Δv."""
     system, world, state, port = started(scene)
     couple(world, state, port)
     tool, device = slice(*system.tool_dofs), system.device_mechanism()
-    for mechanism, q, body, force in ((system.mechanism, state.q, port.hand_body, port.hand_force),
-                                      (device, port.device_q, port.device_body, port.device_hand_force)):
+    for mechanism, q, body, force in (
+        (system.mechanism, state.q, port.hand_body, port.hand_force),
+        (device, port.device_q, port.device_body, port.device_hand_force),
+    ):
         rotations, positions = mechanism.placements(q)
         point = positions[body] + rotations[body] @ port.hand_point
         expected = mechanism.point_jacobian(q, body, point).T @ port.wrench[:3]
-        assert force == pytest.approx(expected + mechanism.frame_jacobian(q, body)[3:].T @ port.wrench[3:], abs=1e-13)
+        assert force == pytest.approx(
+            expected + mechanism.frame_jacobian(q, body)[3:].T @ port.wrench[3:], abs=1e-13
+        )
     apart = device.difference(state.q[slice(*system.tool_coordinates)], port.device_q)
     spring = port.stiffness * apart + port.damping * (port.device_v - state.v[tool])
     assert port.coupling_force[tool] == pytest.approx(spring, abs=1e-12)
@@ -53,7 +67,9 @@ def test_the_hand_does_the_work_of_its_wrench_at_the_held_point_of_tool_and_devi
 
 
 @pytest.mark.parametrize("engaged", [False, True])
-def test_through_a_unilateral_coupler_the_hand_reaches_the_tool_only_as_long_as_it_is_off(engaged: bool) -> None:
+def test_through_a_unilateral_coupler_the_hand_reaches_the_tool_only_as_long_as_it_is_off(
+    engaged: bool,
+) -> None:
     _, world, state, port = started(BEHIND, UnilateralCoupler)
     port.engaged[0] = engaged
     couple(world, state, port)
@@ -65,6 +81,10 @@ def test_unilateral_actuators_give_the_coupler_alone_and_others_all_of_it() -> N
     for kind, share in ((FourChannel, 1.0), (UnilateralCoupler, 0.0)):
         system, _, _, port = started(BEHIND.with_values({"device": None}), kind)
         rng, tool = np.random.default_rng(0), slice(*system.tool_dofs)
-        port.environment_force[:], port.coupling_force[:] = rng.normal(size=(2, len(port.coupling_force)))
+        port.environment_force[:], port.coupling_force[:] = rng.normal(
+            size=(2, len(port.coupling_force))
+        )
         command(port)
-        assert np.array_equal(port.device_force, share * port.environment_force[tool] - port.coupling_force[tool])
+        assert np.array_equal(
+            port.device_force, share * port.environment_force[tool] - port.coupling_force[tool]
+        )

@@ -1,4 +1,5 @@
-"""Moving on the configuration manifold: integrate and difference, and joints against the matrix exponential."""
+"""Moving on the configuration manifold: integrate and difference, and joints against the matrix
+exponential."""
 
 from __future__ import annotations
 
@@ -52,7 +53,18 @@ def test_the_unit_length_survives_a_million_radians(kind):
     assert abs(np.linalg.norm(q[unit]) - 1.0) <= 1e-15
 
 
-ANGLES = [0.0, 1e-9, 0.6 * SMALL_ANGLE, 0.99 * SMALL_ANGLE, 1.01 * SMALL_ANGLE, 0.01, 1.0, 3.0, 3.5, 6.0]
+ANGLES = [
+    0.0,
+    1e-9,
+    0.6 * SMALL_ANGLE,
+    0.99 * SMALL_ANGLE,
+    1.01 * SMALL_ANGLE,
+    0.01,
+    1.0,
+    3.0,
+    3.5,
+    6.0,
+]
 
 
 @pytest.mark.parametrize("angle", ANGLES)
@@ -69,10 +81,16 @@ def test_a_free_flyer_moves_by_the_exponential_of_its_twist_and_back(angle: floa
         q = np.array([*rng.normal(size=3), *start.as_quat()])
         there = flyer.integrate(q, np.array([*u, *(angle * axis)]))
         assert there[:3] == pytest.approx(q[:3] + start.as_matrix() @ moved[:3, 3], abs=1e-13)
-        assert Rotation.from_quat(there[3:]).as_matrix() == pytest.approx(start.as_matrix() @ moved[:3, :3], abs=1e-13)
-        assert there[3:] @ q[3:] == pytest.approx(abs(np.cos(0.5 * angle)), abs=1e-13)  # of q and −q the nearer one
+        assert Rotation.from_quat(there[3:]).as_matrix() == pytest.approx(
+            start.as_matrix() @ moved[:3, :3], abs=1e-13
+        )
+        assert there[3:] @ q[3:] == pytest.approx(
+            abs(np.cos(0.5 * angle)), abs=1e-13
+        )  # of q and −q the nearer one
         if angle < np.pi:
             assert flyer.difference(q, there) == pytest.approx([*u, *(angle * axis)], abs=1e-11)
         for sign in (1.0, -1.0):  # both quaternions of a rotation are the same place
             other = np.array([*there[:3], *(sign * there[3:])])
-            assert flyer.difference(q, other) == pytest.approx(flyer.difference(q, there), abs=1e-13)
+            assert flyer.difference(q, other) == pytest.approx(
+                flyer.difference(q, there), abs=1e-13
+            )

@@ -1,4 +1,5 @@
-"""Laws of the equations of motion, over random trees and on mechanisms small enough to know by heart."""
+"""Laws of the equations of motion, over random trees and on mechanisms small enough to know by
+heart."""
 
 from __future__ import annotations
 
@@ -25,7 +26,9 @@ seeds = st.integers(0, 2**32 - 1)
 
 def rod(name, parent, x, joint=None):
     inertia = np.diag([0.0, 1.0 / 12.0, 1.0 / 12.0])
-    return Body(name, parent, joint or Joint("revolute"), (np.eye(3), (x, 0, 0)), 1.0, (0.5, 0, 0), inertia)
+    return Body(
+        name, parent, joint or Joint("revolute"), (np.eye(3), (x, 0, 0)), 1.0, (0.5, 0, 0), inertia
+    )
 
 
 def two_link_arm():
@@ -50,7 +53,8 @@ def test_the_arm_of_figure_2_has_its_textbook_mass_matrix_and_energy():
 @settings(max_examples=40)
 @given(seeds, st.integers(1, 10), st.integers(1, 3))
 def test_mass_matrix_momenta_and_energy_are_sums_over_the_bodies(seed, joints, trees):
-    """M = Σ m JᵀJ + JωᵀI Jω at the centres of mass; Σ m u and Σ I ω + (c − c̄) × m u, written out with numpy."""
+    """M = Σ m JᵀJ + JωᵀI Jω at the centres of mass; Σ m u and Σ I ω + (c − c̄) × m u, written out
+    with numpy."""
     rng = np.random.default_rng(seed)
     mechanism = random_mechanism(rng, joints, OFTEN_FIXED, trees)
     q, v = random_state(rng, mechanism)
@@ -74,11 +78,17 @@ def test_mass_matrix_momenta_and_energy_are_sums_over_the_bodies(seed, joints, t
     assert (found == found.T).all() and not found[outside].any()
     assert mechanism.kinetic_energy(q, v) == pytest.approx(0.5 * v @ mass @ v, rel=1e-9)
     tau = mass @ v + mechanism.bias(q, v) + mechanism.gravity(q, FIELD)
-    np.testing.assert_allclose(mechanism.inverse_dynamics(q, v, v, FIELD), tau, atol=1e-10 * np.abs(tau).max(initial=0))
+    np.testing.assert_allclose(
+        mechanism.inverse_dynamics(q, v, v, FIELD), tau, atol=1e-10 * np.abs(tau).max(initial=0)
+    )
     if masses:
-        spins = np.sum(spins, axis=0) + np.sum(np.cross(centers - np.average(centers, 0, masses), momenta), axis=0)
+        spins = np.sum(spins, axis=0) + np.sum(
+            np.cross(centers - np.average(centers, 0, masses), momenta), axis=0
+        )
         expected = [*np.sum(momenta, axis=0), *spins]
-        np.testing.assert_allclose(mechanism.centroidal_momentum(q, v), expected, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(
+            mechanism.centroidal_momentum(q, v), expected, rtol=1e-9, atol=1e-9
+        )
 
 
 @settings(max_examples=30)
@@ -136,47 +146,71 @@ def test_names_units_and_layout():
     assert mechanism.coordinate_names[-2:] == ("wheel.cos", "wheel.sin")
     assert mechanism.coordinate_units == ("m",) * 3 + ("1",) * 6
     assert mechanism.velocity_units == ("m/s",) * 3 + ("rad/s",) * 4
-    assert mechanism.velocity_names == (*(f"ball.{turn}" for turn in ("x", "y", "z", "rx", "ry", "rz")), "wheel.angle")
+    assert mechanism.velocity_names == (
+        *(f"ball.{turn}" for turn in ("x", "y", "z", "rx", "ry", "rz")),
+        "wheel.angle",
+    )
     assert mechanism.tree_dofs == [(0, 7), (7, 7)] and list(mechanism.tree_of_body) == [0, 0, 1]
     np.testing.assert_array_equal(mechanism.neutral(), [0, 0, 0, 0, 0, 0, 1, 1, 0])
 
 
-@pytest.mark.parametrize(("call", "named"), [
-    (lambda: Joint("hinge"), "kind"),
-    (lambda: Joint("revolute", (0, 0, 0)), "axis"),
-    (lambda: Body("b", None, Joint("fixed"), mass=-1.0), "mass"),
-    (lambda: Body("b", None, Joint("fixed"), mass=float("nan")), "mass"),
-    (lambda: Body("b", None, Joint("fixed"), (np.diag([1, 1, -1]), np.zeros(3))), "placement rotation"),
-    (lambda: Body("b", None, Joint("fixed"), inertia=np.triu(np.ones((3, 3)))), "inertia"),
-    (lambda: Mechanism([rod("a", "b", 0.0)]), "parent"),
-    (lambda: Mechanism([rod("a", None, 0.0), rod("a", None, 0.0)]), "name"),
-    (lambda: Mechanism([rod("a", None, 0), rod("b", None, 0), rod("c", "a", 0)]), "bodies"),
-    (lambda: two_link_arm().mass_matrix([0.0]), "q"),
-    (lambda: two_link_arm().mass_matrix([["a", "b"]]), "q"),
-    (lambda: two_link_arm().mass_matrices([[0.0]]), "qs"),
-    (lambda: two_link_arm().bias([0.0, 0.0], [0.0, np.inf]), "v"),
-    (lambda: two_link_arm().biases([[0.0, 0.0]], [[0.0, 0.0], [0.0, np.inf]]), "as many rows as qs"),
-    (lambda: two_link_arm().biases([[0.0, 0.0]] * 2, [[0.0, 0.0], [0.0, np.inf]]), r"vs\[1\]"),
-    (lambda: two_link_arm().energies([[0.0, 0.0]] * 2, [[0.0, 0.0]], [0.0] * 3), "as many rows as qs"),
-    (lambda: two_link_arm().point_jacobian([0.0, 0.0], "hand", [0, 0, 0]), "body"),
-    (lambda: two_link_arm().rows_along([[0.0, 0.0]], [9], [[0, 0, 0]], [[1, 0, 0]]), "bodies"),
-    (lambda: two_link_arm().rows_along([[0.0, 0.0]], [0, 1], [[0, 0, 0]], [[1, 0, 0]]), "as many as qs"),
-    (lambda: WHEEL.mass_matrix([1.0, 1.0]), "q of body 'a'"),
-    (lambda: WHEEL.mass_matrices([[1.0, 0.0], [1.0, 1.0]]), r"qs\[1\] of body 'a'"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("call", "named"),
+    [
+        (lambda: Joint("hinge"), "kind"),
+        (lambda: Joint("revolute", (0, 0, 0)), "axis"),
+        (lambda: Body("b", None, Joint("fixed"), mass=-1.0), "mass"),
+        (lambda: Body("b", None, Joint("fixed"), mass=float("nan")), "mass"),
+        (
+            lambda: Body("b", None, Joint("fixed"), (np.diag([1, 1, -1]), np.zeros(3))),
+            "placement rotation",
+        ),
+        (lambda: Body("b", None, Joint("fixed"), inertia=np.triu(np.ones((3, 3)))), "inertia"),
+        (lambda: Mechanism([rod("a", "b", 0.0)]), "parent"),
+        (lambda: Mechanism([rod("a", None, 0.0), rod("a", None, 0.0)]), "name"),
+        (lambda: Mechanism([rod("a", None, 0), rod("b", None, 0), rod("c", "a", 0)]), "bodies"),
+        (lambda: two_link_arm().mass_matrix([0.0]), "q"),
+        (lambda: two_link_arm().mass_matrix([["a", "b"]]), "q"),
+        (lambda: two_link_arm().mass_matrices([[0.0]]), "qs"),
+        (lambda: two_link_arm().bias([0.0, 0.0], [0.0, np.inf]), "v"),
+        (
+            lambda: two_link_arm().biases([[0.0, 0.0]], [[0.0, 0.0], [0.0, np.inf]]),
+            "as many rows as qs",
+        ),
+        (lambda: two_link_arm().biases([[0.0, 0.0]] * 2, [[0.0, 0.0], [0.0, np.inf]]), r"vs\[1\]"),
+        (
+            lambda: two_link_arm().energies([[0.0, 0.0]] * 2, [[0.0, 0.0]], [0.0] * 3),
+            "as many rows as qs",
+        ),
+        (lambda: two_link_arm().point_jacobian([0.0, 0.0], "hand", [0, 0, 0]), "body"),
+        (lambda: two_link_arm().rows_along([[0.0, 0.0]], [9], [[0, 0, 0]], [[1, 0, 0]]), "bodies"),
+        (
+            lambda: two_link_arm().rows_along([[0.0, 0.0]], [0, 1], [[0, 0, 0]], [[1, 0, 0]]),
+            "as many as qs",
+        ),
+        (lambda: WHEEL.mass_matrix([1.0, 1.0]), "q of body 'a'"),
+        (lambda: WHEEL.mass_matrices([[1.0, 0.0], [1.0, 1.0]]), r"qs\[1\] of body 'a'"),
+    ],
+)
 def test_errors_name_the_argument(call, named):
     with pytest.raises(ArgumentError, match=named):
         call()
 
 
 @given(seeds, st.integers(0, 5))
-def test_many_states_give_bit_for_bit_what_each_gives_alone_in_any_layout(seed: int, count: int) -> None:
+def test_many_states_give_bit_for_bit_what_each_gives_alone_in_any_layout(
+    seed: int, count: int
+) -> None:
     rng = np.random.default_rng(seed)
     mechanism = random_mechanism(rng, 5)
     states = [random_state(rng, mechanism) for _ in range(count)]
-    qs, vs = (np.array([state[i] for state in states]).reshape(count, -1 if count else n)
-              for i, n in enumerate((mechanism.nq, mechanism.nv)))
-    masses = np.array([mechanism.mass_matrix(q) for q in qs]).reshape(count, mechanism.nv, mechanism.nv)
+    qs, vs = (
+        np.array([state[i] for state in states]).reshape(count, -1 if count else n)
+        for i, n in enumerate((mechanism.nq, mechanism.nv))
+    )
+    masses = np.array([mechanism.mass_matrix(q) for q in qs]).reshape(
+        count, mechanism.nv, mechanism.nv
+    )
     biases = np.array([mechanism.bias(q, v) for q, v in zip(qs, vs, strict=True)]).reshape(vs.shape)
     for layout in (np.asarray, np.asfortranarray, lambda rows: np.repeat(rows, 2, axis=1)[:, ::2]):
         np.testing.assert_array_equal(mechanism.mass_matrices(layout(qs)), masses)
@@ -185,10 +219,13 @@ def test_many_states_give_bit_for_bit_what_each_gives_alone_in_any_layout(seed: 
 
 @pytest.mark.parametrize("name", ["arm_obstacles", "peg_hole_space", "arm_pushing"])
 def test_rows_along_number_bodies_as_the_scene_does_where_some_do_not_move(name: str) -> None:
-    """The kernels that need M alone leave out what is fixed to the world; contacts name bodies of the whole scene."""
+    """The kernels that need M alone leave out what is fixed to the world; contacts name bodies of
+    the whole scene."""
     mechanism = mechanism_of(load_scene(find_scene(name)))
     q, rng = mechanism.neutral(), np.random.default_rng(0)
     for body in range(len(mechanism.names)):
         point, along = rng.normal(size=3), rng.normal(size=3)
         [row] = mechanism.rows_along([q], [body], [point], [along])
-        np.testing.assert_allclose(row, along @ mechanism.point_jacobian(q, body, point), atol=1e-13, rtol=1e-12)
+        np.testing.assert_allclose(
+            row, along @ mechanism.point_jacobian(q, body, point), atol=1e-13, rtol=1e-12
+        )

@@ -1,4 +1,5 @@
-"""What the structure says about M and B holds in numbers; merging what is fixed together changes neither."""
+"""What the structure says about M and B holds in numbers; merging what is fixed together changes
+neither."""
 
 from __future__ import annotations
 

@@ -38,19 +38,31 @@ def read(tmp_path):
 
 
 def test_a_link_and_its_joint_are_read_as_the_specification_says(read):
-    """Inertia in link axes; the default axis is x, and rpy turns about fixed axes. Pinocchio reads the rest alike."""
+    """Inertia in link axes; the default axis is x, and rpy turns about fixed axes. Pinocchio reads
+    the rest alike."""
     origin = '<origin xyz="1 2 3" rpy="0.1 0.2 0.3"/>'
     body = read(link("base"), link("arm"), joint("j", "base", "arm", inside=origin)).bodies[1]
-    assert body.mass == 2.0 and list(body.center_of_mass) == [0.1, 0.0, 0.0] and body.joint.axis == (1.0, 0.0, 0.0)
+    assert (
+        body.mass == 2.0
+        and list(body.center_of_mass) == [0.1, 0.0, 0.0]
+        and body.joint.axis == (1.0, 0.0, 0.0)
+    )
     np.testing.assert_allclose(body.inertia, [[2, -0.1, 0], [-0.1, 1, 0], [0, 0, 3]], atol=1e-15)
-    np.testing.assert_allclose(body.placement[0], Rotation.from_euler("xyz", [0.1, 0.2, 0.3]).as_matrix(), atol=1e-15)
+    np.testing.assert_allclose(
+        body.placement[0], Rotation.from_euler("xyz", [0.1, 0.2, 0.3]).as_matrix(), atol=1e-15
+    )
     assert list(body.placement[1]) == [1.0, 2.0, 3.0]
 
 
 def test_children_come_depth_first_in_the_order_of_joint_names_with_their_kinds(read):
     links = [link(name) for name in ("z", "y", "x", "w", "u", "base")]
-    joints = [joint("b", "base", "x", "planar"), joint("a", "base", "y", "fixed"), joint("c", "y", "w", "continuous"),
-              joint("B", "base", "z", "prismatic"), joint("d", "w", "u", "floating")]
+    joints = [
+        joint("b", "base", "x", "planar"),
+        joint("a", "base", "y", "fixed"),
+        joint("c", "y", "w", "continuous"),
+        joint("B", "base", "z", "prismatic"),
+        joint("d", "w", "u", "floating"),
+    ]
     mechanism = read(*links, *joints)
     assert mechanism.names == ("base", "z", "y", "w", "u", "x")  # upper case sorts before lower
     kinds = [body.joint.kind for body in mechanism.bodies]
@@ -66,7 +78,10 @@ def test_a_floating_base_moves_freely(read):
 
 def test_mimic_joints_are_independent(read):
     links = [link("base"), link("a"), link("b")]
-    joints = [joint("j", "base", "a"), joint("k", "base", "b", inside='<mimic joint="j" multiplier="2"/>')]
+    joints = [
+        joint("j", "base", "a"),
+        joint("k", "base", "b", inside='<mimic joint="j" multiplier="2"/>'),
+    ]
     assert read(*links, *joints).nv == 2
 
 
@@ -81,11 +96,26 @@ BASE, ARM = link("base"), link("arm")
 MISTAKES = {
     "unknown type": ([BASE, ARM, joint("elbow", "base", "arm", "hinge")], "elbow.*type"),
     "no such link": ([BASE, joint("elbow", "base", "hand")], "elbow.*child"),
-    "two parents": ([BASE, ARM, joint("a", "base", "arm"), joint("b", "base", "arm")], "'b'.*child"),
-    "zero axis": ([BASE, ARM, joint("elbow", "base", "arm", inside='<axis xyz="0 0 0"/>')], "elbow.*axis"),
-    "two numbers": ([BASE, ARM, joint("elbow", "base", "arm", inside='<axis xyz="0 1"/>')], "elbow.*axis"),
-    "not a number": ([BASE, ARM, joint("j", "base", "arm", inside='<origin rpy="0 0 pi"/>')], "'j'.*origin rpy"),
-    "infinite": ([BASE, ARM, joint("j", "base", "arm", inside='<origin xyz="0 0 inf"/>')], "'j'.*origin xyz"),
+    "two parents": (
+        [BASE, ARM, joint("a", "base", "arm"), joint("b", "base", "arm")],
+        "'b'.*child",
+    ),
+    "zero axis": (
+        [BASE, ARM, joint("elbow", "base", "arm", inside='<axis xyz="0 0 0"/>')],
+        "elbow.*axis",
+    ),
+    "two numbers": (
+        [BASE, ARM, joint("elbow", "base", "arm", inside='<axis xyz="0 1"/>')],
+        "elbow.*axis",
+    ),
+    "not a number": (
+        [BASE, ARM, joint("j", "base", "arm", inside='<origin rpy="0 0 pi"/>')],
+        "'j'.*origin rpy",
+    ),
+    "infinite": (
+        [BASE, ARM, joint("j", "base", "arm", inside='<origin xyz="0 0 inf"/>')],
+        "'j'.*origin xyz",
+    ),
     "negative mass": ([link("base", INERTIAL.replace('value="2"', 'value="-2"'))], "base.*mass"),
     "no mass": ([link("base", "<inertial><origin/></inertial>")], "base.*inertial"),
     "no izz": ([link("base", INERTIAL.replace("izz", "i_zz"))], "base.*izz"),
@@ -93,7 +123,10 @@ MISTAKES = {
     "inertial twice": ([link("base", "<inertial/><inertial/>")], "twice"),
     "wrong attribute": ([link("base", INERTIAL.replace("xyz", "xzy"))], "xzy"),
     "no name": (["<link/>"], "name"),
-    "no child": ([BASE, '<joint name="j" type="fixed"><parent link="base"/></joint>'], "'j'.*child"),
+    "no child": (
+        [BASE, '<joint name="j" type="fixed"><parent link="base"/></joint>'],
+        "'j'.*child",
+    ),
     "two roots": ([BASE, ARM], "base.*arm"),
     "nothing": ([], "root"),
     "ring": ([BASE, ARM, link("c"), joint("a", "arm", "c"), joint("b", "c", "arm")], "form a loop"),
@@ -111,23 +144,37 @@ def test_what_others_add_is_let_through(read):
     assert len(read(*added).names) == 1
 
 
-@pytest.mark.parametrize("tag", ["link", "joint", "inertial", "origin", "mass", "inertia", "axis", "parent",
-                                 "child"])  # fmt: skip
+@pytest.mark.parametrize(
+    "tag", ["link", "joint", "inertial", "origin", "mass", "inertia", "axis", "parent", "child"]
+)
 def test_no_element_can_be_misspelt(tag, tmp_path):
     """One letter lost, anywhere in a shipped file."""
-    text, wrong = (scene_folder() / "robots" / "seven_axis_arm.urdf").read_text(), tag[:-2] + tag[-1]
+    text, wrong = (
+        (scene_folder() / "robots" / "seven_axis_arm.urdf").read_text(),
+        tag[:-2] + tag[-1],
+    )
     text = re.sub("<collision>.*?</collision>", "", text, flags=re.DOTALL)
     for found in re.finditer(rf"<{tag}\b", text):
         path = tmp_path / "robot.urdf"
-        path.write_text(text[: found.start()] + re.sub(rf"(</?){tag}\b", rf"\1{wrong}", text[found.start() :]))
+        path.write_text(
+            text[: found.start()] + re.sub(rf"(</?){tag}\b", rf"\1{wrong}", text[found.start() :])
+        )
         with pytest.raises(ArgumentError):
             read_urdf(path)
 
 
-@pytest.mark.parametrize(("text", "named"), [
-    ("<robot><link name='a'></robot>", "well-formed"), ("<model/>", "<robot>"), ("", "well-formed"),
-    ('<!DOCTYPE r [<!ENTITY a "1"><!ENTITY b "&a;&a;">]><robot><link name="&b;"/></robot>', "DOCTYPE"),
-])
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("<robot><link name='a'></robot>", "well-formed"),
+        ("<model/>", "<robot>"),
+        ("", "well-formed"),
+        (
+            '<!DOCTYPE r [<!ENTITY a "1"><!ENTITY b "&a;&a;">]><robot><link name="&b;"/></robot>',
+            "DOCTYPE",
+        ),
+    ],
+)
 def test_files_that_are_no_urdf_are_refused(tmp_path, text, named):
     path = tmp_path / "robot.urdf"
     path.write_text(text)

@@ -15,7 +15,8 @@ from iapb.scene import Scene, load_scene, scene_from_text
 from iapb.scene.mechanism import mechanism_of, pairs_of, shapes_of, start_of
 from iapb.system import System
 
-# A bracket on the world carries a chain of three links, the last with a welded tool; two pucks lie free.
+# A bracket on the world carries a chain of three links, the last with a welded tool; two pucks lie
+# free.
 CHAIN = scene_from_text("""\
 name: chain
 rate: 1000
@@ -46,11 +47,15 @@ def test_q_and_v_are_the_positions_and_velocities_in_the_order_of_the_bodies() -
     assert mechanism.names == tuple(body.name for body in scene.bodies)
     assert q.shape == (mechanism.nq,) and q[mechanism.coordinate_names.index("two.angle")] == 0.5
     assert v.shape == (mechanism.nv,) and v[-3:].tolist() == [1, 2, 3]
-    np.testing.assert_array_equal(mechanism.mass_matrix(q)[-3:, -3:], np.diag([2.0, 2.0, 3.0]))  # of the free puck
+    np.testing.assert_array_equal(
+        mechanism.mass_matrix(q)[-3:, -3:], np.diag([2.0, 2.0, 3.0])
+    )  # of the free puck
 
 
 def test_prismatic_axis_lies_in_the_plane_and_has_length_one() -> None:
-    scene = CHAIN.with_values({"bodies.puck": {"name": "puck", "joint": "prismatic", "axis": [0, 5], "mass": 2}})
+    scene = CHAIN.with_values(
+        {"bodies.puck": {"name": "puck", "joint": "prismatic", "axis": [0, 5], "mass": 2}}
+    )
     mechanism, (q, _) = mechanism_of(scene), start_of(scene)
     step = np.zeros(mechanism.nv)
     step[-1] = 0.25
@@ -68,7 +73,9 @@ def test_shapes_of_a_body_that_nothing_moves_are_static_and_in_world_axes() -> N
     shapes = shapes_of(CHAIN)
     assert list(shapes.body) == [-1, 1, 2, 3, 4, 5, -1]
     assert list(shapes.kind) == [CIRCLE] * 4 + [POLYGON, CIRCLE, HALF_PLANE]
-    np.testing.assert_allclose(shapes.vertices[shapes.first[BRACKET]], [1.0, 5.0], atol=1e-15)  # turned by 90°
+    np.testing.assert_allclose(
+        shapes.vertices[shapes.first[BRACKET]], [1.0, 5.0], atol=1e-15
+    )  # turned by 90°
     np.testing.assert_array_equal(shapes.vertices[shapes.first[FLOOR] + 1], [0.0, 1.0])
 
 
@@ -85,14 +92,23 @@ def test_a_turned_box_of_a_moving_body_is_in_body_axes_with_the_bits_of_plain_ar
 
 
 def test_moving_shapes_meet_walls_and_other_trees_neighbours_never_meet() -> None:
-    others = {*(frozenset((link, FLOOR)) for link in (ONE, TWO, THREE, TOOL, PUCK)),
-              *(frozenset((link, PUCK)) for link in (BRACKET, ONE, TWO, THREE, TOOL))}
+    others = {
+        *(frozenset((link, FLOOR)) for link in (ONE, TWO, THREE, TOOL, PUCK)),
+        *(frozenset((link, PUCK)) for link in (BRACKET, ONE, TWO, THREE, TOOL)),
+    }
     # one tree: more than one joint apart; the tool is welded to link three
-    own = {*map(frozenset, ((BRACKET, TWO), (BRACKET, THREE), (BRACKET, TOOL), (ONE, THREE), (ONE, TOOL)))}
+    own = {
+        *map(
+            frozenset,
+            ((BRACKET, TWO), (BRACKET, THREE), (BRACKET, TOOL), (ONE, THREE), (ONE, TOOL)),
+        )
+    }
     assert pairs(CHAIN) == others | own
     assert pairs(CHAIN.with_values({"contact.self_collisions": False})) == others
     shapes = shapes_of(CHAIN)
-    assert (shapes.body[pairs_of(CHAIN, shapes)[:, 0]] >= 0).all()  # the first shape of a pair moves
+    assert (
+        shapes.body[pairs_of(CHAIN, shapes)[:, 0]] >= 0
+    ).all()  # the first shape of a pair moves
 
 
 BODY = """name: thing
@@ -114,11 +130,17 @@ def mistakes_of(text: str, file: str = "(text)") -> str:
     return str(failure.value)
 
 
-@pytest.mark.parametrize(("written", "matrix"), [
-    ("[1, 2, 3]", [[1, 0, 0], [0, 2, 0], [0, 0, 3]]),
-    ("[1, 2, 3, 0.1, 0.2, 0.3]", [[1, 0.1, 0.2], [0.1, 2, 0.3], [0.2, 0.3, 3]]),
-    ("[[1, 0.1, 0], [0.1, 2, 0], [0, 0, 3]]", [[1, 0.1, 0], [0.1, 2, 0], [0, 0, 3]])])
-def test_inertia_as_three_six_or_nine_numbers_and_the_start_at_rest(written: str, matrix: list[list[float]]) -> None:
+@pytest.mark.parametrize(
+    ("written", "matrix"),
+    [
+        ("[1, 2, 3]", [[1, 0, 0], [0, 2, 0], [0, 0, 3]]),
+        ("[1, 2, 3, 0.1, 0.2, 0.3]", [[1, 0.1, 0.2], [0.1, 2, 0.3], [0.2, 0.3, 3]]),
+        ("[[1, 0.1, 0], [0.1, 2, 0], [0, 0, 3]]", [[1, 0.1, 0], [0.1, 2, 0], [0, 0, 3]]),
+    ],
+)
+def test_inertia_as_three_six_or_nine_numbers_and_the_start_at_rest(
+    written: str, matrix: list[list[float]]
+) -> None:
     scene = scene_from_text((BODY % "").replace("[1, 2, 3]", written))
     assert mechanism_of(scene).bodies[0].inertia.tolist() == matrix
     assert start_of(scene)[0].tolist() == [0, 0, 0, 0, 0, 0, 1]
@@ -149,7 +171,9 @@ def test_urdf_paths_stay_in_the_scene_folder(tmp_path: Path, urdf: str) -> None:
     folder.mkdir()
     (tmp_path / "r.urdf").write_text(URDF)
     (folder / "link.urdf").symlink_to(tmp_path / "r.urdf")
-    assert "inside the scene's folder" in mistakes_of(scene_with_robot(folder, urdf), str(folder / "scene.yaml"))
+    assert "inside the scene's folder" in mistakes_of(
+        scene_with_robot(folder, urdf), str(folder / "scene.yaml")
+    )
 
 
 def test_unknown_links_and_bad_files_are_mistakes_of_the_scene(tmp_path: Path) -> None:

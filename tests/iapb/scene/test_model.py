@@ -1,4 +1,5 @@
-"""A scene's values: set by path, written as text that reads back the same, filled from a density."""
+"""A scene's values: set by path, written as text that reads back the same, filled from a
+density."""
 
 from __future__ import annotations
 
@@ -21,30 +22,71 @@ SPACE = "name: d\nrate: 1e3\nduration: 0.5\ndimensions: 3\nbodies:\n  - {name: b
 def test_a_scene_keeps_its_text_and_reads_yaml_numbers_and_aliases() -> None:
     text = PLANE % "mass: &m 1, inertia: 1e-3, density: null" + "hand: {body: b, point: [0, *m]}\n"
     scene = scene_from_text(text)
-    assert (scene.rate, scene.step, scene.steps, scene.bodies[0].inertia) == (1000.0, 1e-3, 500, 1e-3)
+    assert (scene.rate, scene.step, scene.steps, scene.bodies[0].inertia) == (
+        1000.0,
+        1e-3,
+        500,
+        1e-3,
+    )
     assert scene.source_text == text and scene.hand is not None and scene.hand.point == (0.0, 1.0)
-    assert not {"stiffness", "damping"} & set(scene.resolved()["contact"])  # the toolkit will choose them
+    assert not {"stiffness", "damping"} & set(
+        scene.resolved()["contact"]
+    )  # the toolkit will choose them
 
 
 @given(st.floats(0.0, 1e9), st.floats(-1e9, 1e9), st.floats(0.0, 1.0))
-def test_text_and_values_of_a_changed_scene_give_it_to_the_last_bit(friction: float, angle: float, e: float) -> None:
-    changed = PEG.with_values({"contact.friction": friction, "bodies.peg.position.2": angle, "contact.restitution": e})
+def test_text_and_values_of_a_changed_scene_give_it_to_the_last_bit(
+    friction: float, angle: float, e: float
+) -> None:
+    changed = PEG.with_values(
+        {"contact.friction": friction, "bodies.peg.position.2": angle, "contact.restitution": e}
+    )
     plain = changed.resolved()
     assert scene_from_text(changed.source_text).resolved() == plain
     assert Scene.model_validate(copy.deepcopy(plain)).resolved() == plain
 
 
-@pytest.mark.parametrize("title", [
-    "", "a wall", "null", "Yes", "1e-3", "0x10", "# no comment", "a: b", "- a", "two\nlines\r", "it's \"so\" \\n",
-    " a ", "Größe 😀", "\x07\x7f\x85\u2028\ufeff\ud7ff", "[a, b]", "{a}", "&a *b !c %d @e `f",
-    ".1e1", "---", "... a", "a #b", "?", "~"])
+@pytest.mark.parametrize(
+    "title",
+    [
+        "",
+        "a wall",
+        "null",
+        "Yes",
+        "1e-3",
+        "0x10",
+        "# no comment",
+        "a: b",
+        "- a",
+        "two\nlines\r",
+        'it\'s "so" \\n',
+        " a ",
+        "Größe 😀",
+        "\x07\x7f\x85\u2028\ufeff\ud7ff",
+        "[a, b]",
+        "{a}",
+        "&a *b !c %d @e `f",
+        ".1e1",
+        "---",
+        "... a",
+        "a #b",
+        "?",
+        "~",
+    ],
+)
 def test_any_text_stands_in_the_text_of_a_scene(title: str) -> None:
     assert scene_from_text(PEG.with_values({"title": title}).source_text).title == title
 
 
 def test_values_are_set_by_name_and_by_number_and_the_scene_itself_stays() -> None:
-    changed = PEG.with_values({"contact.friction": 0.3, "bodies.peg.position.2": 0.1, "walls.1.point": np.array([0, 1]),
-                               "rate": np.float64(256)})
+    changed = PEG.with_values(
+        {
+            "contact.friction": 0.3,
+            "bodies.peg.position.2": 0.1,
+            "walls.1.point": np.array([0, 1]),
+            "rate": np.float64(256),
+        }
+    )
     assert (changed.contact.friction, changed.rate, PEG.contact.friction) == (0.3, 256.0, 0.0)
     assert changed.bodies[0].position == (*PEG.bodies[0].position[:2], 0.1)
     assert changed.walls[1].point == (0.0, 1.0)  # type: ignore[union-attr]
@@ -58,9 +100,14 @@ def test_an_absent_section_is_made_and_its_defaults_apply() -> None:
 
 
 @given(st.lists(st.floats(0.0, 2.0 * math.pi), min_size=3, max_size=12, unique=True), st.booleans())
-def test_points_on_a_circle_are_convex_and_stored_counterclockwise(angles: list[float], clockwise: bool) -> None:
+def test_points_on_a_circle_are_convex_and_stored_counterclockwise(
+    angles: list[float], clockwise: bool
+) -> None:
     angles.sort()
-    if min(b - a for a, b in zip(angles, [*angles[1:], angles[0] + 2.0 * math.pi], strict=True)) < 1e-3:
+    if (
+        min(b - a for a, b in zip(angles, [*angles[1:], angles[0] + 2.0 * math.pi], strict=True))
+        < 1e-3
+    ):
         return
     points = [[math.cos(a), math.sin(a)] for a in (angles[::-1] if clockwise else angles)]
     wall = {"name": "wedge", "kind": "polygon", "vertices": points}
@@ -68,21 +115,59 @@ def test_points_on_a_circle_are_convex_and_stored_counterclockwise(angles: list[
     assert float(x @ np.roll(y, -1) - np.roll(x, -1) @ y) > 0.0
 
 
-@pytest.mark.parametrize(("kind", "shapes", "mass", "center", "moments"), [
-    (PLANE, "{kind: box, size: [0.2, 0.1]}", 0.02, (0, 0), [0.02 * 0.05 / 12]),
-    (PLANE, "{kind: circle, radius: 0.5, center: [1, 2]}", math.pi / 4, (1, 2), [math.pi / 32]),
-    (PLANE, "{kind: polygon, vertices: [[0, 0], [1, 0], [0, 1]]}", 0.5, (1 / 3, 1 / 3), [0.5 / 9]),
-    # two squares side by side are a rectangle, 2 by 1
-    (PLANE, "{kind: box, size: [1, 1]}, {kind: box, size: [1, 1], center: [1, 0]}", 2.0, (0.5, 0), [2.0 * 5 / 12]),
-    (PLANE, "{kind: polygon, vertices: [[0, 0], [2, 0], [2, 2], [0, 2]], angle: 1.5707963267948966, center: [1, 0]}",
-     4.0, (0, 1), [4.0 * 8 / 12]),
-    (SPACE, "{kind: sphere, radius: 0.5, center: [1, 0, 0]}", math.pi / 6, (1, 0, 0), [math.pi / 60] * 3),
-    (SPACE, "{kind: box, size: [1, 1, 1]}, {kind: box, size: [1, 1, 1], center: [1, 0, 0]}", 2.0, (0.5, 0, 0),
-     [2 / 6, 5 / 6, 5 / 6]),
-    (SPACE, "{kind: box, size: [1, 2, 3], rpy: [0.3, -0.2, 1.1]}", 6.0, (0, 0, 0), [2.5, 5.0, 6.5]),
-])
+@pytest.mark.parametrize(
+    ("kind", "shapes", "mass", "center", "moments"),
+    [
+        (PLANE, "{kind: box, size: [0.2, 0.1]}", 0.02, (0, 0), [0.02 * 0.05 / 12]),
+        (PLANE, "{kind: circle, radius: 0.5, center: [1, 2]}", math.pi / 4, (1, 2), [math.pi / 32]),
+        (
+            PLANE,
+            "{kind: polygon, vertices: [[0, 0], [1, 0], [0, 1]]}",
+            0.5,
+            (1 / 3, 1 / 3),
+            [0.5 / 9],
+        ),
+        # two squares side by side are a rectangle, 2 by 1
+        (
+            PLANE,
+            "{kind: box, size: [1, 1]}, {kind: box, size: [1, 1], center: [1, 0]}",
+            2.0,
+            (0.5, 0),
+            [2.0 * 5 / 12],
+        ),
+        (
+            PLANE,
+            "{kind: polygon, vertices: [[0, 0], [2, 0], [2, 2], [0, 2]], angle: 1.5707963267948966, center: [1, 0]}",
+            4.0,
+            (0, 1),
+            [4.0 * 8 / 12],
+        ),
+        (
+            SPACE,
+            "{kind: sphere, radius: 0.5, center: [1, 0, 0]}",
+            math.pi / 6,
+            (1, 0, 0),
+            [math.pi / 60] * 3,
+        ),
+        (
+            SPACE,
+            "{kind: box, size: [1, 1, 1]}, {kind: box, size: [1, 1, 1], center: [1, 0, 0]}",
+            2.0,
+            (0.5, 0, 0),
+            [2 / 6, 5 / 6, 5 / 6],
+        ),
+        (
+            SPACE,
+            "{kind: box, size: [1, 2, 3], rpy: [0.3, -0.2, 1.1]}",
+            6.0,
+            (0, 0, 0),
+            [2.5, 5.0, 6.5],
+        ),
+    ],
+)
 def test_a_density_gives_mass_center_and_inertia(
-        kind: str, shapes: str, mass: float, center: Any, moments: list[float]) -> None:
+    kind: str, shapes: str, mass: float, center: Any, moments: list[float]
+) -> None:
     found = scene_from_text(kind % f"density: 10, shapes: [{shapes}]").bodies[0]
     assert (found.mass, found.density) == (pytest.approx(10.0 * mass), None)
     assert found.center_of_mass == pytest.approx(center, abs=1e-15)

@@ -1,4 +1,5 @@
-"""One table of refusals: what a scene may not say, the field that is named, and the line; no text breaks the reader."""
+"""One table of refusals: what a scene may not say, the field that is named, and the line; no text
+breaks the reader."""
 
 from __future__ import annotations
 
@@ -74,7 +75,15 @@ IN_THE_PLANE: dict[str, list[Any]] = {
     "bodies.slide.density": [1.0],  # no shapes
     "bodies.arm.joint_damping": [*(x for x in NEGATIVE if x != [1]), [1.0, 1.0], [-1.0]],
     "bodies.puck.joint_damping": [1.0, [1.0, 1.0], [1.0, 1.0, -1.0]],
-    "bodies.arm.joint_limits": [1.0, [1.0], [1.0, 2.0], [1.0, -1.0], [0.0, 0.0], ["x", 1.0], [-1.0, math.nan]],
+    "bodies.arm.joint_limits": [
+        1.0,
+        [1.0],
+        [1.0, 2.0],
+        [1.0, -1.0],
+        [0.0, 0.0],
+        ["x", 1.0],
+        [-1.0, math.nan],
+    ],
     "bodies.puck.joint_limits": [[-1.0, 1.0]],
     "bodies.base.joint_limits": [[-1.0, 1.0]],
     "bodies.arm.shapes": [None, 3, [3], [{"kind": "capsule"}], [{"kind": "half_plane"}], [{}]],
@@ -87,9 +96,16 @@ IN_THE_PLANE: dict[str, list[Any]] = {
     "walls.post.name": [*NOT_A_NAME, "floor"],
     "walls.floor.kind": ["plane", None, "box"],
     "walls.wedge.vertices": [
-        3, [[0, 0], [1, 0]], [[0, 0], [1, 0], [2, 0]], [[0, 0], [1, 0], [1, 0], [0, 1]], [[0, 0, 0], [1, 0], [0, 1]],
-        [[0, 0], [2, 0], [2, 2], [1, 0.5]], [[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]], [[0, 0], [1, 1], [1, 0], [0, 1]],
-        [[math.cos(4 * math.pi * k / 5), math.sin(4 * math.pi * k / 5)] for k in range(5)]],  # a pentagram
+        3,
+        [[0, 0], [1, 0]],
+        [[0, 0], [1, 0], [2, 0]],
+        [[0, 0], [1, 0], [1, 0], [0, 1]],
+        [[0, 0, 0], [1, 0], [0, 1]],
+        [[0, 0], [2, 0], [2, 2], [1, 0.5]],
+        [[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]],
+        [[0, 0], [1, 1], [1, 0], [0, 1]],
+        [[math.cos(4 * math.pi * k / 5), math.sin(4 * math.pi * k / 5)] for k in range(5)],
+    ],  # a pentagram
     "contact.forces": ["explicit", None],
     "contact.stiffness": [value for value in NEGATIVE if value != 1e10] + [1.1e15],
     "contact.damping": [value for value in NEGATIVE if value != 1e10] + [1.1e15],
@@ -99,28 +115,71 @@ IN_THE_PLANE: dict[str, list[Any]] = {
     "hand.body": [*NOT_A_NAME, "nobody", "floor", "foot"],
     "hand.force": [[1.0, 2.0], 3.0, None, [math.nan, 0.0, 0.0]],
     "hand.force_table": [1.0, [1.0], [[0.0, 1.0]], [[0.0, 1.0, 1.0, "x"]], [[0.0] * 4, [0.0] * 4]],
-    "hand.force_function": ["t", ["t"], [None, "t", "t"], *([text, "0", "0"] for text in (
-        "__import__('os').system('ls')", "t.real", "open(t)", "t if t else 1", "(", "sin()", "1/t", "2**0.5", "1e400",
-        "'1'", "", "[t]", "u", "9" * 1900, "-" * 1900 + "1"))],
+    "hand.force_function": [
+        "t",
+        ["t"],
+        [None, "t", "t"],
+        *(
+            [text, "0", "0"]
+            for text in (
+                "__import__('os').system('ls')",
+                "t.real",
+                "open(t)",
+                "t if t else 1",
+                "(",
+                "sin()",
+                "1/t",
+                "2**0.5",
+                "1e400",
+                "'1'",
+                "",
+                "[t]",
+                "u",
+                "9" * 1900,
+                "-" * 1900 + "1",
+            )
+        ),
+    ],
     "device": [[], 3],
     "device.force_limit": [*NOT_A_PAIR_OF_GAINS, [0, 1]],
     "device.delay": [-1, 1001, 1.0, "1", None, True],
-    **{path: values for values, paths in (
-        (NOT_POSITIVE, "bodies.slide.mass bodies.puck.mass bodies.puck.inertia bodies.puck.shapes.0.radius "
-                       "contact.friction_velocity"),
-        (NEGATIVE, "bodies.arm.inertia contact.friction contact.approach_velocity contact.cluster_distance "
-                   "contact.coherence_distance"),
-        (NOT_A_NUMBER, "bodies.arm.angle bodies.arm.shapes.0.angle"),
-        (NOT_A_VECTOR, "bodies.arm.origin bodies.arm.shapes.0.center walls.floor.point hand.point"),
-        (OWN, "bodies.arm.friction walls.floor.friction"),
-        ([*OWN, 1.001], "bodies.arm.restitution walls.floor.restitution"),
-        (NOT_A_PAIR_OF_GAINS, "device.position_resolution device.damping couplings.four_channel.stiffness "
-                              "couplings.four_channel.damping couplings.unilateral.stiffness "
-                              "couplings.unilateral.damping"),
-        ([1, "true", None], "contact.self_collisions"),
-        ([3, None, "x" * 2001], "title source"),
-        ([*NOT_A_VECTOR, [0.0, 0.0]], "bodies.slide.axis bodies.arm.center_of_mass walls.floor.normal"),
-    ) for path in paths.split()},
+    **{
+        path: values
+        for values, paths in (
+            (
+                NOT_POSITIVE,
+                "bodies.slide.mass bodies.puck.mass bodies.puck.inertia "
+                "bodies.puck.shapes.0.radius "
+                "contact.friction_velocity",
+            ),
+            (
+                NEGATIVE,
+                "bodies.arm.inertia contact.friction contact.approach_velocity "
+                "contact.cluster_distance "
+                "contact.coherence_distance",
+            ),
+            (NOT_A_NUMBER, "bodies.arm.angle bodies.arm.shapes.0.angle"),
+            (
+                NOT_A_VECTOR,
+                "bodies.arm.origin bodies.arm.shapes.0.center walls.floor.point hand.point",
+            ),
+            (OWN, "bodies.arm.friction walls.floor.friction"),
+            ([*OWN, 1.001], "bodies.arm.restitution walls.floor.restitution"),
+            (
+                NOT_A_PAIR_OF_GAINS,
+                "device.position_resolution device.damping couplings.four_channel.stiffness "
+                "couplings.four_channel.damping couplings.unilateral.stiffness "
+                "couplings.unilateral.damping",
+            ),
+            ([1, "true", None], "contact.self_collisions"),
+            ([3, None, "x" * 2001], "title source"),
+            (
+                [*NOT_A_VECTOR, [0.0, 0.0]],
+                "bodies.slide.axis bodies.arm.center_of_mass walls.floor.normal",
+            ),
+        )
+        for path in paths.split()
+    },
 }
 IN_SPACE: dict[str, list[Any]] = {
     "dimensions": [2, None],
@@ -128,23 +187,38 @@ IN_SPACE: dict[str, list[Any]] = {
     "bodies.thing.joint": ["planar"],
     "bodies.thing.mass": [0.0],
     "bodies.thing.position": [[0, 0, 0], [0, 0, 0, 0, 0, 1, 1]],
-    "bodies.thing.inertia": [[1, 2, 9.9e-19], [1, 1, 1, 1, 0, 0], [1, 1, 1, 0.8, 0.8, -0.8],
-                             [[1, 0.1, 0], [0.2, 2, 0], [0, 0, 3]], 1.0],
+    "bodies.thing.inertia": [
+        [1, 2, 9.9e-19],
+        [1, 1, 1, 1, 0, 0],
+        [1, 1, 1, 0.8, 0.8, -0.8],
+        [[1, 0.1, 0], [0.2, 2, 0], [0, 0, 3]],
+        1.0,
+    ],
     "bodies.wheel.axis": [None, [0, 0], [0, 0, 0]],
     "bodies.wheel.position": [[1, 1]],
     "walls.floor.normal": [[0, 1], [0, 0, 0]],
 }
-TABLE = [(FULL, *row) for row in IN_THE_PLANE.items()] + [(FULL_SPACE, *row) for row in IN_SPACE.items()]
+TABLE = [(FULL, *row) for row in IN_THE_PLANE.items()] + [
+    (FULL_SPACE, *row) for row in IN_SPACE.items()
+]
 
 
 @pytest.mark.parametrize(("scene", "path", "values"), TABLE, ids=[row[1] for row in TABLE])
-def test_every_field_refuses_what_it_cannot_take(scene: Scene, path: str, values: list[Any]) -> None:
+def test_every_field_refuses_what_it_cannot_take(
+    scene: Scene, path: str, values: list[Any]
+) -> None:
     field = path.split(".")[-1]
     for value in values:
         with pytest.raises(SceneError) as caught:
             scene.with_values({path: value})
-        near = [m for m in caught.value.mistakes if field in m.path or m.path.startswith(path.split(".")[0])]
-        assert near, f"{path} = {value!r} was refused, but the mistake points elsewhere: {caught.value}"
+        near = [
+            m
+            for m in caught.value.mistakes
+            if field in m.path or m.path.startswith(path.split(".")[0])
+        ]
+        assert near, (
+            f"{path} = {value!r} was refused, but the mistake points elsewhere: {caught.value}"
+        )
 
 
 def field_names(part: Any) -> set[str]:
@@ -155,10 +229,17 @@ def field_names(part: Any) -> set[str]:
 
 def test_no_field_is_left_out_above() -> None:
     tried = {path.split(".")[-1] for path in IN_THE_PLANE}
-    assert field_names(FULL.resolved()) - tried == {"contact", "hand", "couplings", "four_channel", "unilateral"}
+    assert field_names(FULL.resolved()) - tried == {
+        "contact",
+        "hand",
+        "couplings",
+        "four_channel",
+        "unilateral",
+    }
 
 
-# (text that is replaced, its replacement, field of the mistake, its line); in the plane unless the text is of SPACE
+# (text that is replaced, its replacement, field of the mistake, its line); in the plane unless the
+# text is of SPACE
 WRITTEN = [
     ("rate: 1000", "rate: fast", "rate", 2),
     ("rate: 1000", "rate: 1\nrate: 2", "rate", 3),
@@ -172,8 +253,22 @@ WRITTEN = [
     ("kind: half_plane", "kind: halfplane", "walls[0].kind", 12),
     ("normal: [0, 1]", "normal: [0, 0]", "walls[0].normal", 12),
     ("friction: 0.2", "fricton: 0.2", "contact.fricton", 15),
-    *(("friction: 0.2", f"friction: {word}", "contact.friction", 15) for word in (
-        ".nan", ".inf", "1e999", "yes", "0x10", "1_000", "'1'", "true", "null", "[1]", "9" * 5000)),
+    *(
+        ("friction: 0.2", f"friction: {word}", "contact.friction", 15)
+        for word in (
+            ".nan",
+            ".inf",
+            "1e999",
+            "yes",
+            "0x10",
+            "1_000",
+            "'1'",
+            "true",
+            "null",
+            "[1]",
+            "9" * 5000,
+        )
+    ),
     ("body: arm", "body: am", "hand.body", 16),
     ("hand: {body: arm}\n", "", "device", 16),
     ("damping: [0, 0]", "damping: [0]", "device.damping", 17),
@@ -195,21 +290,40 @@ def test_a_mistake_stands_at_its_line(old: str, new: str, field: str, line: int)
 
 
 def test_all_mistakes_come_at_once_as_an_editor_expects_them() -> None:
-    wrong = PLANE.replace("rate: 1000", "rate: 0").replace("mass: 1, inertia", "mass: -1, inertia").replace(
-        "friction: 0.2", "fricton: 0.2").replace("body: arm", "body: am")
+    wrong = (
+        PLANE.replace("rate: 1000", "rate: 0")
+        .replace("mass: 1, inertia", "mass: -1, inertia")
+        .replace("friction: 0.2", "fricton: 0.2")
+        .replace("body: arm", "body: am")
+    )
     with pytest.raises(SceneError) as caught:
         scene_from_text(wrong, "wrong.yaml")
-    places = [(m.line, wrong.splitlines()[m.line - 1][m.column - 1 :][:7], m.path) for m in caught.value.mistakes]
-    assert places == [(2, "0", "rate"), (9, "-1, ine", "bodies[3].mass"), (15, "fricton", "contact.fricton"),
-                      (16, "am}", "hand.body")]
-    assert str(caught.value.mistakes[0]).startswith("wrong.yaml:2:7: rate = 0: expected a number >= ")
+    places = [
+        (m.line, wrong.splitlines()[m.line - 1][m.column - 1 :][:7], m.path)
+        for m in caught.value.mistakes
+    ]
+    assert places == [
+        (2, "0", "rate"),
+        (9, "-1, ine", "bodies[3].mass"),
+        (15, "fricton", "contact.fricton"),
+        (16, "am}", "hand.body"),
+    ]
+    assert str(caught.value.mistakes[0]).startswith(
+        "wrong.yaml:2:7: rate = 0: expected a number >= "
+    )
     assert "did you mean friction?" in caught.value.mistakes[2].expected
     with pytest.raises(SceneError) as caught:
         FULL.with_values({"bodies.puck.mass": -1, "contact.frition": 3, "device.delay": 2.5})
-    assert {m.path for m in caught.value.mistakes} == {"bodies[3].mass", "contact.frition", "device.delay"}
+    assert {m.path for m in caught.value.mistakes} == {
+        "bodies[3].mass",
+        "contact.frition",
+        "device.delay",
+    }
 
 
-@pytest.mark.parametrize("part", ["contact", "hand", "device", "couplings.unilateral", "bodies.arm", "walls.post"])
+@pytest.mark.parametrize(
+    "part", ["contact", "hand", "device", "couplings.unilateral", "bodies.arm", "walls.post"]
+)
 def test_unknown_fields_are_refused_everywhere(part: str) -> None:
     with pytest.raises(SceneError) as caught:
         FULL.with_values({f"{part}.masss": 1})
@@ -223,23 +337,36 @@ def test_bodies_of_one_tree_stand_together() -> None:
         Scene.model_validate(plain)
 
 
-@pytest.mark.parametrize(("text", "line", "word"), [
-    ("name: [1, 2\nrate: 3\n", 2, "YAML"),
-    ("name: 'open\n", 2, "YAML"),
-    ("\tname: x\n", 1, "YAML"),
-    ("name: \x00\n", 1, "YAML"),
-    ('name: "\\UFFFFFFFF"\n', 1, "YAML"),
-    ("name: !!python/object/apply:os.getcwd []\n", 1, "tags"),
-    ("a: 1\n---\nb: 2\n", 2, "document"),
-    ("a: *b\n", 1, "alias"),
-    ("a: &x [1, *x]\n", 1, "levels"),
-    ("? [1, 2]\n: 3\n", 1, "name of a field"),
-    ("a: " + "[" * 100 + "]" * 100, 1, "levels"),
-    ("a: " + "[" * 5_000, 1, "YAML"),
-    ("a: &a [" + "1, " * 400 + "1]\nb: &b [" + "*a, " * 400 + "*a]\nc: [" + "*b, " * 9 + "*b]\n", 1, "smaller"),
-    ("#" * 1_000_001, 1, "at most 1000000"),
-    *((text, 1, "mapping") for text in ("", "3\n", "[]\n", "just words\n", "~\n")),
-])
+@pytest.mark.parametrize(
+    ("text", "line", "word"),
+    [
+        ("name: [1, 2\nrate: 3\n", 2, "YAML"),
+        ("name: 'open\n", 2, "YAML"),
+        ("\tname: x\n", 1, "YAML"),
+        ("name: \x00\n", 1, "YAML"),
+        ('name: "\\UFFFFFFFF"\n', 1, "YAML"),
+        ("name: !!python/object/apply:os.getcwd []\n", 1, "tags"),
+        ("a: 1\n---\nb: 2\n", 2, "document"),
+        ("a: *b\n", 1, "alias"),
+        ("a: &x [1, *x]\n", 1, "levels"),
+        ("? [1, 2]\n: 3\n", 1, "name of a field"),
+        ("a: " + "[" * 100 + "]" * 100, 1, "levels"),
+        ("a: " + "[" * 5_000, 1, "YAML"),
+        (
+            "a: &a ["
+            + "1, " * 400
+            + "1]\nb: &b ["
+            + "*a, " * 400
+            + "*a]\nc: ["
+            + "*b, " * 9
+            + "*b]\n",
+            1,
+            "smaller",
+        ),
+        ("#" * 1_000_001, 1, "at most 1000000"),
+        *((text, 1, "mapping") for text in ("", "3\n", "[]\n", "just words\n", "~\n")),
+    ],
+)
 def test_what_is_no_document_is_one_mistake_with_its_line(text: str, line: int, word: str) -> None:
     with pytest.raises(SceneError) as caught:
         scene_from_text(text)
@@ -257,36 +384,83 @@ def test_files_that_cannot_be_read_say_why(tmp_path: Path) -> None:
         load_scene(path)
 
 
-@pytest.mark.parametrize("name", [None, 3, b"peg_corner", {}, "a\0b", "a" * 5000, "a/" + "b" * 5000,
-                                  "a" * 5000 + ".yaml"], ids=lambda name: repr(name)[:9])
+@pytest.mark.parametrize(
+    "name",
+    [None, 3, b"peg_corner", {}, "a\0b", "a" * 5000, "a/" + "b" * 5000, "a" * 5000 + ".yaml"],
+    ids=lambda name: repr(name)[:9],
+)
 def test_what_cannot_be_a_scene_is_named(name: Any) -> None:
     with pytest.raises(ArgumentError, match="^scene = "):
         find_scene(name)
 
 
-@pytest.mark.parametrize("path", ["bodies.peg_2.mass", "contact.friction.x", "walls.7.point", "bodies..mass", "", 3])
+@pytest.mark.parametrize(
+    "path", ["bodies.peg_2.mass", "contact.friction.x", "walls.7.point", "bodies..mass", "", 3]
+)
 def test_paths_that_lead_nowhere_are_named(path: Any) -> None:
     with pytest.raises(ArgumentError) as caught:
         FULL.with_values({path: 1})
     assert caught.value.value == path
 
 
-@pytest.mark.parametrize("values", [None, [("duration", 1)], "duration", {"hand.force": (x for x in (1, 2, 3))},
-                                    {"gravity": {0.0, 9.0}}], ids=["none", "pairs", "text", "generator", "set"])
+@pytest.mark.parametrize(
+    "values",
+    [
+        None,
+        [("duration", 1)],
+        "duration",
+        {"hand.force": (x for x in (1, 2, 3))},
+        {"gravity": {0.0, 9.0}},
+    ],
+    ids=["none", "pairs", "text", "generator", "set"],
+)
 def test_new_values_of_a_wrong_kind_are_named(values: Any) -> None:
     with pytest.raises(ArgumentError, match="^values = "):
         FULL.with_values(values)
 
 
 junk = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8) | st.binary(max_size=4),
-    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=6), inner, max_size=4), max_leaves=8)
+    st.none()
+    | st.booleans()
+    | st.integers()
+    | st.floats()
+    | st.text(max_size=8)
+    | st.binary(max_size=4),
+    lambda inner: (
+        st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=6), inner, max_size=4)
+    ),
+    max_leaves=8,
+)
 
 
-@given(st.dictionaries(st.sampled_from([
-    "name", "rate", "bodies", "bodies.arm", "bodies.arm.shapes", "bodies.arm.shapes.0", "bodies.arm.shapes.0.kind",
-    "bodies.arm.position", "walls", "walls.floor", "walls.floor.kind", "contact", "hand", "device", "couplings",
-    "couplings.four_channel", "gravity"]), junk, min_size=1, max_size=2))
+@given(
+    st.dictionaries(
+        st.sampled_from(
+            [
+                "name",
+                "rate",
+                "bodies",
+                "bodies.arm",
+                "bodies.arm.shapes",
+                "bodies.arm.shapes.0",
+                "bodies.arm.shapes.0.kind",
+                "bodies.arm.position",
+                "walls",
+                "walls.floor",
+                "walls.floor.kind",
+                "contact",
+                "hand",
+                "device",
+                "couplings",
+                "couplings.four_channel",
+                "gravity",
+            ]
+        ),
+        junk,
+        min_size=1,
+        max_size=2,
+    )
+)
 def test_no_value_whatever_ends_in_another_error(values: dict[str, Any]) -> None:
     try:
         changed = FULL.with_values(values)

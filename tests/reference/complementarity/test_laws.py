@@ -37,8 +37,11 @@ def gain(problem: ImpactProblem, v_plus: np.ndarray) -> float:
 
 
 @given(st.integers(0, 100_000), st.floats(0.0, 1.0))
-def test_equality_is_the_complementarity_solution_exactly_where_it_need_not_pull(seed: int, e: float) -> None:
-    """The wider class of C05: one e, and *some* p >= 0 gives the equality's motion, which then solves the LCP."""
+def test_equality_is_the_complementarity_solution_exactly_where_it_need_not_pull(
+    seed: int, e: float
+) -> None:
+    """The wider class of C05: one e, and *some* p >= 0 gives the equality's motion, which then
+    solves the LCP."""
     problem = random_problem(seed, 1 + seed % 8, e)
     rows, mass = problem.contact_jacobian, problem.mass_matrix
     equality = newton_equality(problem)
@@ -55,7 +58,9 @@ def test_sound_laws_never_gain_energy_with_unequal_restitution(seed: int) -> Non
     contacts = 1 + seed % 5
     problem = random_problem(seed, contacts, np.random.default_rng(seed).uniform(size=contacts))
     assert gain(problem, poisson(problem).velocity) <= 1e-11
-    with suppress(SolverError):  # Newton's velocities can be infeasible; Poisson always has a solution
+    with suppress(
+        SolverError
+    ):  # Newton's velocities can be infeasible; Poisson always has a solution
         assert gain(problem, newton_lcp(problem).velocity) <= 1e-11
 
 
@@ -67,7 +72,8 @@ def test_contradicting_equalities_are_an_error() -> None:
 
 
 def test_adhesion_is_told_from_an_artefact() -> None:
-    """Two rows and their sum: the least-norm impulse of one may be negative though another choice is not."""
+    """Two rows and their sum: the least-norm impulse of one may be negative though another choice
+    is not."""
     rows = np.array([[1.0, 0.0], [1.0, 1.0], [1.0, 2.0]])
     given = np.array([3.0, 0.1])  # close to the first row: least norm pulls at the third
     least_norm = np.linalg.lstsq(rows.T, given)[0]
@@ -79,14 +85,23 @@ def test_adhesion_is_told_from_an_artefact() -> None:
 
 
 def test_laws_and_steps_go_on_where_daqp_cycles(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The Newton LCP, Poisson, steps and event-driven motions ask other solvers, and say so where none is left."""
+    """The Newton LCP, Poisson, steps and event-driven motions ask other solvers, and say so where
+    none is left."""
     problem = random_problem(7, 8, 0.5)
-    row = LinearSystem(np.eye(2), [0.0, -9.81], [[0.0, 1.0], [0.0, 1.0], [-1.0, 0.0]], [0.0, 0.0, 1.0], 0.5)
+    row = LinearSystem(
+        np.eye(2), [0.0, -9.81], [[0.0, 1.0], [0.0, 1.0], [-1.0, 0.0]], [0.0, 0.0, 1.0], 0.5
+    )
 
     def outcomes() -> list[np.ndarray]:
-        step = nearest_velocity(problem.mass_matrix, problem.velocity, problem.contact_jacobian, np.zeros(8))
-        return [newton_lcp(problem).velocity, poisson(problem).velocity, step.velocity,
-                event_driven(row, [0.0, 0.5], [1.0, 0.0], 1.2).v[-1]]  # fmt: skip
+        step = nearest_velocity(
+            problem.mass_matrix, problem.velocity, problem.contact_jacobian, np.zeros(8)
+        )
+        return [
+            newton_lcp(problem).velocity,
+            poisson(problem).velocity,
+            step.velocity,
+            event_driven(row, [0.0, 0.5], [1.0, 0.0], 1.2).v[-1],
+        ]
 
     def cycle(*_: object) -> np.ndarray:
         raise SolverError("daqp: exit flag -2")
@@ -94,14 +109,18 @@ def test_laws_and_steps_go_on_where_daqp_cycles(monkeypatch: pytest.MonkeyPatch)
     usual = outcomes()
     monkeypatch.setattr(qp, "daqp", cycle)
     monkeypatch.setitem(STEP_SOLVERS, "daqp", cycle)
-    assert all(found == pytest.approx(expected, abs=1e-9) for found, expected in zip(outcomes(), usual, strict=True))
+    assert all(
+        found == pytest.approx(expected, abs=1e-9)
+        for found, expected in zip(outcomes(), usual, strict=True)
+    )
     with pytest.raises(SolverError, match="exit flag -2"):
         newton_lcp(problem, "daqp")
 
 
 @pytest.mark.parametrize("condition", [1.0, 1e6, 1e12])
 def test_rows_that_depend_up_to_rounding_get_no_impulse_from_noise(condition: float) -> None:
-    """Twice the same rows on an ill-conditioned M: the impulses of each pair are equal, as least norm says."""
+    """Twice the same rows on an ill-conditioned M: the impulses of each pair are equal, as least
+    norm says."""
     rng = np.random.default_rng(3)
     axes, _ = np.linalg.qr(rng.normal(size=(6, 6)))
     mass, rows = axes @ np.diag(np.geomspace(1.0, condition, 6)) @ axes.T, rng.normal(size=(3, 6))
@@ -129,7 +148,8 @@ def test_the_engines_pushing_method_is_the_newton_lcp(seed: int, e: float) -> No
 
 
 def test_poissons_law_on_dependent_rows_of_both_signs() -> None:
-    """What compression stops leaves rounding in opposed rows, which no solver can meet: it is judged by the speeds."""
+    """What compression stops leaves rounding in opposed rows, which no solver can meet: it is
+    judged by the speeds."""
     for seed in range(12):
         rng = np.random.default_rng(seed)
         rows = rng.integers(-2, 3, size=(60, 3)).astype(float) @ rng.integers(-2, 3, size=(3, 5))

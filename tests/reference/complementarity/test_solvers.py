@@ -1,4 +1,5 @@
-"""Every solver answers the same question: compare velocities and residuals, never impulses; friction by hand."""
+"""Every solver answers the same question: compare velocities and residuals, never impulses;
+friction by hand."""
 
 from __future__ import annotations
 
@@ -25,10 +26,12 @@ from reference.complementarity.solvers import SolverEntry
 from reference.complementarity.solvers.enumeration import all_solutions
 
 ROOT = Path(__file__).resolve().parents[3]
-# What each solver reaches on small redundant problems, relative velocity, with a factor ten of room.
+# What each solver reaches on small redundant problems, relative velocity, with a factor ten of
+# room.
 REACHED = {"proxqp": 1e-5, "cvxpy_scs": 1e-5, "cvxpy_osqp": 1e-6, "cvxpy_clarabel": 1e-8}
-# quadprog and Lemke can end without an answer on exactly redundant rows, Gauss-Seidel can be too slow on
-# nearly dependent ones; their solution must then judge itself unsolved, and in a few of the SEEDS only.
+# quadprog and Lemke can end without an answer on exactly redundant rows, Gauss-Seidel can be too
+# slow on nearly dependent ones; their solution must then judge itself unsolved, and in a few of the
+# SEEDS only.
 MAY_FAIL = {"quadprog", "lemke", "gauss_seidel"}
 SEEDS, FAILURES_ALLOWED = 12, 2
 
@@ -41,7 +44,9 @@ def test_solvers_agree_with_enumeration_by_velocities(name: str) -> None:
         d, c = rng.integers(1, 7), rng.integers(1, 8)
         rank, root = rng.integers(1, d + 1), rng.normal(size=(d, d))
         rows = rng.normal(size=(c, rank)) @ rng.normal(size=(rank, d))
-        problem = ImpactProblem.from_impact(root @ root.T + 0.1 * np.eye(d), rows, rng.normal(size=d), rng.uniform())
+        problem = ImpactProblem.from_impact(
+            root @ root.T + 0.1 * np.eye(d), rows, rng.normal(size=d), rng.uniform()
+        )
         truth, solution = solve(problem, "enumeration").velocity_plus, solve(problem, name)
         if name in MAY_FAIL and not solution.solved():
             assert solution.verdict() == "failed"
@@ -62,7 +67,17 @@ def test_redundant_contacts_have_many_impulses_and_one_velocity() -> None:
 
 
 @pytest.mark.parametrize(
-    "wrong", [[0.0, 0.0], [-1.0, 3.0], [5.0, 5.0], [np.nan, 1.0], [np.inf, 1.0], [1.0], [1.0, 1.0, 0.0], None]
+    "wrong",
+    [
+        [0.0, 0.0],
+        [-1.0, 3.0],
+        [5.0, 5.0],
+        [np.nan, 1.0],
+        [np.inf, 1.0],
+        [1.0],
+        [1.0, 1.0, 0.0],
+        None,
+    ],
 )
 def test_planted_wrong_solutions_are_judged_unsolved(wrong: list[float] | None) -> None:
     problem = ImpactProblem.from_delassus([[2.0, 1.0], [1.0, 2.0]], [-5.0, -6.0])
@@ -87,12 +102,15 @@ def test_a_problem_without_solution_is_solved_by_nobody_and_one_without_contacts
     assert all(not solve(problem, name).solved() for name in solver_names(problem))
     nothing = ImpactProblem.from_impact(np.eye(2), np.zeros((0, 2)), [1.0, 2.0], 0.5)
     for solution in (solve(nothing, name) for name in solver_names(nothing)):
-        assert solution.solved() and np.array_equal(solution.velocity_plus, [1.0, 2.0]), solution.solver
+        assert solution.solved() and np.array_equal(solution.velocity_plus, [1.0, 2.0]), (
+            solution.solver
+        )
 
 
 @pytest.mark.parametrize("scale", [1e-12, 1e-9, 1.0, 1e9])
 def test_enumeration_finds_solutions_at_every_scale(scale: float) -> None:
-    """Rank one, W = s·1, b = −1: every p >= 0 with the sum 1/s solves it; with W = −s·1 none does."""
+    """Rank one, W = s·1, b = −1: every p >= 0 with the sum 1/s solves it; with W = −s·1 none
+    does."""
     for sign in (1.0, -1.0):
         problem = ImpactProblem.from_delassus(sign * scale * np.ones((3, 3)), -np.ones(3))
         assert solve(problem, "enumeration").solved(1e-12) == (sign > 0.0)
@@ -101,31 +119,40 @@ def test_enumeration_finds_solutions_at_every_scale(scale: float) -> None:
 LCP, IMPACT = ImpactProblem.from_delassus, ImpactProblem.from_impact
 
 
-@pytest.mark.parametrize(("call", "says"), [
-    (lambda: solve(LCP([[1.0]], [0.0]), "simplex"), "one of enumeration"),
-    (lambda: IMPACT(np.eye(1), [[1.0]], [1.0], 1.5), "restitution"),
-    (lambda: IMPACT(np.eye(1), [[1.0]], [1.0], [0.5, 0.5]), "restitution"),
-    (lambda: IMPACT(np.eye(3), np.eye(3), np.ones(3), 0.0, -0.1), "friction"),
-    (lambda: IMPACT(np.eye(2), [[1.0]], [1.0, 0.0], 1.0), "contact_jacobian"),
-    (lambda: IMPACT(-np.eye(1), [[1.0]], [1.0], 1.0), "positive definite"),
-    (lambda: IMPACT(np.eye(2), np.eye(2), np.ones(2), 0.0, 0.5), "divisor"),
-    (lambda: LCP([[np.nan]], [1.0]), "finite"), (lambda: LCP([[1.0, 0.0]], [1.0]), "delassus"),
-    (lambda: LCP([[1.0]], [1.0]).velocity_plus(np.ones(1)), "from_impact"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("call", "says"),
+    [
+        (lambda: solve(LCP([[1.0]], [0.0]), "simplex"), "one of enumeration"),
+        (lambda: IMPACT(np.eye(1), [[1.0]], [1.0], 1.5), "restitution"),
+        (lambda: IMPACT(np.eye(1), [[1.0]], [1.0], [0.5, 0.5]), "restitution"),
+        (lambda: IMPACT(np.eye(3), np.eye(3), np.ones(3), 0.0, -0.1), "friction"),
+        (lambda: IMPACT(np.eye(2), [[1.0]], [1.0, 0.0], 1.0), "contact_jacobian"),
+        (lambda: IMPACT(-np.eye(1), [[1.0]], [1.0], 1.0), "positive definite"),
+        (lambda: IMPACT(np.eye(2), np.eye(2), np.ones(2), 0.0, 0.5), "divisor"),
+        (lambda: LCP([[np.nan]], [1.0]), "finite"),
+        (lambda: LCP([[1.0, 0.0]], [1.0]), "delassus"),
+        (lambda: LCP([[1.0]], [1.0]).velocity_plus(np.ones(1)), "from_impact"),
+    ],
+)
 def test_refusals(call: Callable[[], Any], says: str) -> None:
     with pytest.raises(ArgumentError, match=says):
         call()
 
 
 @pytest.mark.thorough
-def test_processes_that_import_quantecon_for_the_first_time_at_once_do_not_spoil_its_cache(tmp_path: Path) -> None:
-    """Without `import_alone`'s lock some of them abort, and so does every later import, most of the time.
+def test_processes_that_import_quantecon_for_the_first_time_at_once_do_not_spoil_its_cache(
+    tmp_path: Path,
+) -> None:
+    """Without `import_alone`'s lock some of them abort, and so does every later import, most of the
+    time.
 
     Both ways in are tried: the compiled solver, and `solve`, which asks for the package first.
     """
     found = find_spec("quantecon")
     assert found is not None and found.origin is not None
-    shutil.copytree(Path(found.origin).parent, tmp_path / "quantecon", ignore=shutil.ignore_patterns("*.nb?"))
+    shutil.copytree(
+        Path(found.origin).parent, tmp_path / "quantecon", ignore=shutil.ignore_patterns("*.nb?")
+    )
     environment = os.environ | {"PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"}
     environment.pop("NUMBA_CACHE_DIR", None)
     script = """
@@ -138,27 +165,41 @@ from reference.complementarity.solvers.lemke import import_lcp_lemke
 _load("lemke", SOLVERS["lemke"]) if int(sys.argv[1]) else import_lcp_lemke()
 """
     for counts in ((0, 4, 8), (0,)):
-        started = [subprocess.Popen([sys.executable, "-c", script, str(k)], env=environment, cwd=tmp_path)
-                   for k in counts]  # fmt: skip
+        started = [
+            subprocess.Popen([sys.executable, "-c", script, str(k)], env=environment, cwd=tmp_path)
+            for k in counts
+        ]
         assert not any(process.wait() for process in started)
 
 
-STACK = ImpactProblem.from_impact(np.eye(2), [[1.0, 0.0], [-1.0, 1.0], [-1.0, 1.0]], [-1.0, -2.0], 0.0, name="stack")
+STACK = ImpactProblem.from_impact(
+    np.eye(2), [[1.0, 0.0], [-1.0, 1.0], [-1.0, 1.0]], [-1.0, -2.0], 0.0, name="stack"
+)
 
 
 def test_every_pair_has_a_verdict_and_velocities_agree(monkeypatch: pytest.MonkeyPatch) -> None:
-    asymmetric = ImpactProblem.from_delassus([[1.0, 0.0], [2.0, 1.0]], [-1.0, -1.0], name="asymmetric")
+    asymmetric = ImpactProblem.from_delassus(
+        [[1.0, 0.0], [2.0, 1.0]], [-1.0, -1.0], name="asymmetric"
+    )
     monkeypatch.setitem(SOLVERS, "absent", SolverEntry("nowhere", "not_a_package", "", "lcp"))
-    rows = [row for problem in (STACK, asymmetric)
-            for row in run_solvers(problem, ["daqp", "gauss_seidel", "nsgs", "absent"])]  # fmt: skip
+    rows = [
+        row
+        for problem in (STACK, asymmetric)
+        for row in run_solvers(problem, ["daqp", "gauss_seidel", "nsgs", "absent"])
+    ]
     verdicts = {(row.problem, row.solver): row.verdict for row in rows}
     assert verdicts["stack", "daqp"] == verdicts["stack", "gauss_seidel"] == "solved"
     assert verdicts["asymmetric", "daqp"] == "refused" and verdicts["stack", "nsgs"] == "refused"
     assert all((row.asymmetry > 0.0) == (row.problem == "asymmetric") for row in rows)
     assert all(row.spread <= 1e-9 for row in rows if row.verdict == "solved")
     missing = [row for row in rows if row.solver == "absent"]
-    assert all(row.verdict == "missing" and "pip install" in row.note and row.residuals.worst == np.inf
-               for row in missing) and len(missing) == 2  # fmt: skip
+    assert (
+        all(
+            row.verdict == "missing" and "pip install" in row.note and row.residuals.worst == np.inf
+            for row in missing
+        )
+        and len(missing) == 2
+    )
 
 
 CONE_SOLVERS = ("nsgs", "cvxpy_socp", "pinocchio_pgs", "pinocchio_admm")
@@ -184,7 +225,8 @@ RELAXED_SOLVERS = ("nsgs", "cvxpy_socp", "pinocchio_admm")
 
 @pytest.mark.parametrize("solver", RELAXED_SOLVERS)
 def test_the_relaxed_law_lifts_off_where_it_slides(solver: str) -> None:
-    """What the convex relaxation costs: sliding bodies separate with mu times their sliding speed."""
+    """What the convex relaxation costs: sliding bodies separate with mu times their sliding
+    speed."""
     solution = solve(mass_on_a_plane([-1.0, 3.0, 4.0], 0.5, relaxed=True), solver)
     v = solution.velocity_plus
     assert solution.solved(1e-7)
@@ -196,9 +238,12 @@ def test_solvers_agree_on_random_problems(relaxed: bool) -> None:
     for seed in range(6):
         rng = np.random.default_rng(seed)
         root, rows = rng.normal(size=(6, 6)), rng.normal(size=(3 * int(rng.integers(1, 4)), 6))
-        problem = ImpactProblem.from_impact(root @ root.T + np.eye(6), rows, rng.normal(size=6), 0.2, 0.3,
-                                            relaxed=relaxed)  # fmt: skip
-        solutions = [solve(problem, name) for name in (RELAXED_SOLVERS if relaxed else CONE_SOLVERS)]
+        problem = ImpactProblem.from_impact(
+            root @ root.T + np.eye(6), rows, rng.normal(size=6), 0.2, 0.3, relaxed=relaxed
+        )
+        solutions = [
+            solve(problem, name) for name in (RELAXED_SOLVERS if relaxed else CONE_SOLVERS)
+        ]
         for solution in solutions:
             assert solution.solved(1e-5), (seed, solution.solver, solution.note, solution.residuals)
             if relaxed:  # convex: one velocity; Coulomb's law may have several
@@ -209,7 +254,10 @@ def test_kinds_of_problems_are_refused_by_solvers_of_the_other_kind() -> None:
     names = solver_names(mass_on_a_plane([1.0, 0.0, 0.0], 0.5))
     assert names == CONE_SOLVERS
     assert solve(mass_on_a_plane([-1.0, 0.0, 0.0], 0.5), "daqp").verdict() == "refused"
-    assert solve(mass_on_a_plane([-1.0, 1.0, 0.0], 0.5, relaxed=True), "pinocchio_pgs").verdict() == "refused"
+    assert (
+        solve(mass_on_a_plane([-1.0, 1.0, 0.0], 0.5, relaxed=True), "pinocchio_pgs").verdict()
+        == "refused"
+    )
     assert solve(ImpactProblem.from_delassus([[1.0]], [-1.0]), "nsgs").verdict() == "refused"
 
 

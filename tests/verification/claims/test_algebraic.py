@@ -40,7 +40,10 @@ def test_the_algebraic_claims_of_the_engine():
     for found in check_claims(ids=["C01", "C02", "C03", "C04", "C05"]):
         wrong = {algebraic.AS_PRINTED} if found.key in ("C01", "C02") else set()
         assert {part.name for part in found.parts if part.verdict != REPRODUCED} == wrong
-        assert found.outcome == ("holds, misprint" if wrong else "holds") and found.verdict == REPRODUCED
+        assert (
+            found.outcome == ("holds, misprint" if wrong else "holds")
+            and found.verdict == REPRODUCED
+        )
 
 
 @pytest.mark.parametrize("fault", [energetic, lossy])
@@ -52,7 +55,9 @@ def test_losses_notice_a_wrong_energy(monkeypatch, fault):
     assert (algebraic.PASSIVE in wrong) == (fault is energetic)
 
 
-@pytest.mark.parametrize(("claim", "fault"), [("C03", last_rows_only), ("C04", lossy), ("C05", lossy)])
+@pytest.mark.parametrize(
+    ("claim", "fault"), [("C03", last_rows_only), ("C04", lossy), ("C05", lossy)]
+)
 def test_a_planted_fault_is_noticed(monkeypatch, claim, fault):
     monkeypatch.setattr(algebraic, "resolve_impact", fault)
     assert False in CLAIMS[claim].table(Study()).holds

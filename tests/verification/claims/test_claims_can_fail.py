@@ -1,4 +1,5 @@
-"""The rule of every claim confirms a row that agrees, refutes one that contradicts, says where a row cannot tell."""
+"""The rule of every claim confirms a row that agrees, refutes one that contradicts, says where a
+row cannot tell."""
 
 import numpy as np
 import pytest
@@ -19,8 +20,16 @@ TIGHT = {"energy from the wall": 0.0, "wall's turnover": 1.0}
 
 # claims -> a row, and what the rule says of it
 ROWS = [
-    *(("C01 C02 C03 C04 C05 C06 C08 C09", LOSS | {"error": error, "bound": 1e-12}, held)
-      for error, held in ((1e-15, True), (1e-12, True), (0.13, False), (np.inf, False), (np.nan, False))),
+    *(
+        ("C01 C02 C03 C04 C05 C06 C08 C09", LOSS | {"error": error, "bound": 1e-12}, held)
+        for error, held in (
+            (1e-15, True),
+            (1e-12, True),
+            (0.13, False),
+            (np.inf, False),
+            (np.nan, False),
+        )
+    ),
     ("C01 C02", LOSS | {"error": 0.1, "bound": 0.2}, None),
     ("C01 C02", LOSS | {"error": 0.0, "bound": 1e-12, "restitution": 1.0}, None),
     ("C01 C02", LOSS | {"error": 0.1, "bound": 1e-12, "restitution": 1.0}, False),
@@ -82,12 +91,13 @@ ROWS = [
     ("C21", SETTLED | {"impulses settle after": np.inf, "penalty settles after": np.inf}, None),
     ("C22", {"ratio": 1.3, "lower quartile": 1.11, "upper quartile": 4.0}, True),
     ("C22", {"ratio": 0.8, "lower quartile": 0.2, "upper quartile": 0.9}, False),
-]  # fmt: skip
+]
 
 
 def test_a_difference_counts_only_if_all_thresholds_agree_on_its_sign():
-    assert [peg.agreed(each) for each in ([0.3, 0.1, 0.2], [-0.3, -0.1, -0.2], [0.3, -0.1, 0.2], 0.4)] == [
-        0.1, -0.1, 0.0, 0.4]  # fmt: skip
+    assert [
+        peg.agreed(each) for each in ([0.3, 0.1, 0.2], [-0.3, -0.1, -0.2], [0.3, -0.1, 0.2], 0.4)
+    ] == [0.1, -0.1, 0.0, 0.4]
 
 
 @pytest.mark.parametrize(("claims", "row", "held"), ROWS)
@@ -97,4 +107,6 @@ def test_the_rule_of_a_claim(claims, row, held):
 
 def test_every_claim_can_hold_and_fail():
     for outcome in (True, False):
-        assert {name for claims, _, held in ROWS if held is outcome for name in claims.split()} == set(CLAIMS)
+        assert {
+            name for claims, _, held in ROWS if held is outcome for name in claims.split()
+        } == set(CLAIMS)

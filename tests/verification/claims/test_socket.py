@@ -1,4 +1,5 @@
-"""C18: what each filter does to the false collisions of a ball in a faceted socket, and the step of its scene."""
+"""C18: what each filter does to the false collisions of a ball in a faceted socket, and the step of
+its scene."""
 
 from __future__ import annotations
 
@@ -24,7 +25,12 @@ def test_coherence_removes_every_false_collision_and_clustering_the_doubled_cont
     both = counted()
     assert neither["false collisions"] >= 10
     assert both["false collisions"] == coherence["false collisions"] == 0
-    assert both["doubled contacts"] == clustering["doubled contacts"] == 0 < coherence["doubled contacts"]
+    assert (
+        both["doubled contacts"]
+        == clustering["doubled contacts"]
+        == 0
+        < coherence["doubled contacts"]
+    )
     # with clustering alone the one contact left at an edge jumps from facet to facet: new each time
     assert clustering["false collisions"] >= neither["false collisions"]
     # a ball that bounces off the edges comes back as new, because coherence looks one step back
@@ -33,7 +39,8 @@ def test_coherence_removes_every_false_collision_and_clustering_the_doubled_cont
 
 
 def explicit_rates(contact: dict[str, float], rate: float) -> tuple[float, float]:
-    """B T / m, and μ F_n T / (v_threshold m_t) with the largest F_n of the run: what a held force may reach."""
+    """B T / m, and μ F_n T / (v_threshold m_t) with the largest F_n of the run: what a held force
+    may reach."""
     scene = socket(contact, rate, 9)
     run, ball = run_world(scene, "IAPB"), scene.bodies[0]
     felt = 1.0 / (1.0 / ball.mass + ball.shapes[0].radius ** 2 / ball.inertia)
@@ -47,10 +54,14 @@ def test_the_scene_is_slow_enough_for_its_step_and_its_books_show_it() -> None:
     assert damper < 0.2 and friction < 1.0
     row = open_row(socket({}, 4000.0, 9), lambda scene: run_world(scene, "IAPB"), (1, 2))
     assert row[f"{OPEN} [%]"] < 5.0
-    assert row["order measured"] == pytest.approx(1.0, abs=0.15)  # semi-implicit Euler's, as declared
+    assert row["order measured"] == pytest.approx(
+        1.0, abs=0.15
+    )  # semi-implicit Euler's, as declared
 
 
-def test_at_a_haptic_step_and_a_sharp_threshold_friction_chatters_and_a_quarter_is_left_open() -> None:
+def test_at_a_haptic_step_and_a_sharp_threshold_friction_chatters_and_a_quarter_is_left_open() -> (
+    None
+):
     sharp = {"friction_velocity": 1e-2}
     damper, friction = explicit_rates(sharp, 1000.0)
     assert damper == pytest.approx(0.4) and friction > 2.0

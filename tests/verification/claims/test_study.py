@@ -1,4 +1,5 @@
-"""The study: runs are injected, shared and sorted by what a world can see; swapped worlds refute the claims."""
+"""The study: runs are injected, shared and sorted by what a world can see; swapped worlds refute
+the claims."""
 
 from dataclasses import replace
 
@@ -39,13 +40,19 @@ def test_each_simulation_is_run_once(few):
 
     said = []
     check_claims(run=run, ids=["C14", "C16"], progress=lambda *done: said.append(done))
-    assert calls and len(calls) == len(set(calls)) and said == [(0, 2, "C14"), (1, 2, "C16"), (2, 2, "")]
+    assert (
+        calls
+        and len(calls) == len(set(calls))
+        and said == [(0, 2, "C14"), (1, 2, "C16"), (2, 2, "")]
+    )
 
 
 def test_a_region_that_the_shared_sequence_misses_gets_starts_of_its_own():
     tested = [Condition(tilt, clearance=0.01) for tilt in (0.02, 0.03)]
     found = drawn(tested, Region((("tilt", "rad", 0.02, 0.03),)), seed=3, count=4)
-    assert len(found) == 4 and all(0.02 <= one.tilt <= 0.03 and one.clearance == 0.01 for one in found)
+    assert len(found) == 4 and all(
+        0.02 <= one.tilt <= 0.03 and one.clearance == 0.01 for one in found
+    )
 
 
 def test_rigid_worlds_do_not_see_friction_or_penalties():
@@ -73,25 +80,39 @@ def test_worlds_under_the_wrong_name_are_found_out(few):
 
 def test_a_limited_device_clips_the_forces_of_both_laws():
     asked, hard = Study(run_world), replace(Condition(), force_limit=0.2)
-    forces = {(world, limit): peak_force(trace(asked, replace(hard, force_limit=limit), world, rendering))
-              for world, rendering in (("PB", "full"), ("IAPB", "spread")) for limit in (0.2, 1.0)}  # fmt: skip
+    forces = {
+        (world, limit): peak_force(trace(asked, replace(hard, force_limit=limit), world, rendering))
+        for world, rendering in (("PB", "full"), ("IAPB", "spread"))
+        for limit in (0.2, 1.0)
+    }
     assert forces["PB", 0.2][:2] == pytest.approx([3.0, 3.0]) == forces["IAPB", 0.2][:2]
     assert 3.0 < forces["PB", 1.0][0] < 10.0 < forces["IAPB", 1.0][0]
 
 
 def test_claims_against_rigid_worlds_have_no_friction():
-    for key, rough in (("C10", False), ("C11", False), ("C12", False), ("C13", False), ("C14", True), ("C15", True)):
+    for key, rough in (
+        ("C10", False),
+        ("C11", False),
+        ("C12", False),
+        ("C13", False),
+        ("C14", True),
+        ("C15", True),
+    ):
         assert any(start.friction for start in CLAIMS[key].cases(Study())) is rough
 
 
 def test_regions_that_overlap_share_the_starts_that_confirm_them():
     tested = start_conditions("quick")
-    wide, narrow = (drawn(tested, Region((("tilt", "rad", None, high),)), 1, 40) for high in (0.3, 0.15))
+    wide, narrow = (
+        drawn(tested, Region((("tilt", "rad", None, high),)), 1, 40) for high in (0.3, 0.15)
+    )
     assert len(wide) == len(narrow) == 40 and all(start.tilt <= 0.15 for start in narrow)
     assert set(narrow) >= {start for start in wide if start.tilt <= 0.15}
     friction = drawn(tested, Region((("friction", "", 0.1, None),)), 1, 40)
     assert all(start.friction >= 0.1 for start in friction)
-    assert [start.seen_by("ideal", "full") for start in friction] == [start.seen_by("ideal", "full") for start in wide]
+    assert [start.seen_by("ideal", "full") for start in friction] == [
+        start.seen_by("ideal", "full") for start in wide
+    ]
 
 
 def test_unknown_claims_and_depths_are_refused():

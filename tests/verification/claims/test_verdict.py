@@ -37,53 +37,94 @@ YES, NO, UNKNOWN = True, False, None
 
 def table(rows, holds, **marks):
     """A judged table of these rows, by default with two conditions."""
-    return replace(table_from(rows, **(marks or {"condition": ["tilt", "width"]})), holds=tuple(holds))
+    return replace(
+        table_from(rows, **(marks or {"condition": ["tilt", "width"]})), holds=tuple(holds)
+    )
 
 
-@pytest.mark.parametrize(("holds", "verdict"), [
-    ([YES, YES, UNKNOWN], REPRODUCED), ([YES, YES, NO], MIXED), ([YES, NO], MIXED), ([YES, NO, NO], REFUTED),
-    ([NO], REFUTED), ([UNKNOWN, UNKNOWN], NOT_TESTABLE), ([], NOT_TESTABLE)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("holds", "verdict"),
+    [
+        ([YES, YES, UNKNOWN], REPRODUCED),
+        ([YES, YES, NO], MIXED),
+        ([YES, NO], MIXED),
+        ([YES, NO, NO], REFUTED),
+        ([NO], REFUTED),
+        ([UNKNOWN, UNKNOWN], NOT_TESTABLE),
+        ([], NOT_TESTABLE),
+    ],
+)
 def test_verdict_follows_from_the_trials(holds, verdict):
     assert verdict_of_trials(holds) == verdict
 
 
 def test_a_printed_range_never_exceeds_the_confirmed_one():
     assert str(Region((("jump", "", 1.0521, 1.4099), ("tilt", "rad", 0.00033331, 0.015)))) == (
-        "1.06 <= jump <= 1.4 and 0.000334 <= tilt <= 0.015 rad")
+        "1.06 <= jump <= 1.4 and 0.000334 <= tilt <= 0.015 rad"
+    )
 
 
-@pytest.mark.parametrize(("verdicts", "verdict"), [
-    ([REPRODUCED] * 2, REPRODUCED), ([REPRODUCED, WHERE], WHERE), ([REPRODUCED, NOT_TESTABLE], NOT_TESTABLE),
-    ([WHERE, NOT_COMPUTED], NOT_COMPUTED), ([REPRODUCED] * 1000 + [REFUTED], REFUTED), ([NOT_COMPUTED, MIXED], MIXED),
-    ([], NOT_COMPUTED)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("verdicts", "verdict"),
+    [
+        ([REPRODUCED] * 2, REPRODUCED),
+        ([REPRODUCED, WHERE], WHERE),
+        ([REPRODUCED, NOT_TESTABLE], NOT_TESTABLE),
+        ([WHERE, NOT_COMPUTED], NOT_COMPUTED),
+        ([REPRODUCED] * 1000 + [REFUTED], REFUTED),
+        ([NOT_COMPUTED, MIXED], MIXED),
+        ([], NOT_COMPUTED),
+    ],
+)
 def test_a_finding_is_never_better_than_its_worst_part(verdicts, verdict):
     assert verdict_of(Part("", one) for one in verdicts) == verdict
 
 
-@pytest.mark.parametrize(("part", "verdict"), [
-    (Part("", NOT_TESTABLE, optional=True), REPRODUCED), (Part("", NOT_TESTABLE), NOT_TESTABLE),
-    (Part("", NOT_TESTABLE, held=9, decided=9, optional=True), NOT_TESTABLE),
-    (Part("", REFUTED, optional=True), REFUTED)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("part", "verdict"),
+    [
+        (Part("", NOT_TESTABLE, optional=True), REPRODUCED),
+        (Part("", NOT_TESTABLE), NOT_TESTABLE),
+        (Part("", NOT_TESTABLE, held=9, decided=9, optional=True), NOT_TESTABLE),
+        (Part("", REFUTED, optional=True), REFUTED),
+    ],
+)
 def test_only_an_optional_part_that_is_absent_is_left_out(part, verdict):
     assert verdict_of([Part("", REPRODUCED), part]) == verdict
     assert verdict_of([Part("", NOT_TESTABLE, optional=True)]) == NOT_TESTABLE
 
 
-@pytest.mark.parametrize(("parts", "outcome", "kind"), [
-    ([(REPRODUCED, ""), (REFUTED, MISPRINT), (REFUTED, BEYOND)], "holds, misprint", MISPRINTED),
-    ([(REPRODUCED, ""), (REFUTED, BEYOND)], "holds", HOLDS), ([(REFUTED, BEYOND)], "not computed", "not computed"),
-    ([(WHERE, ""), (REFUTED, MISPRINT)], "holds where stated", "holds where stated"),
-    ([(WHERE, ""), (REFUTED, "")], "fails in rotation", FAILS_IN),
-    ([(REFUTED, ""), (REPRODUCED, BEYOND)], FAILS, FAILS),
-    ([(REPRODUCED, ""), (MIXED, "")], "fails in some trials in rotation", FAILS_IN),
-    ([(REFUTED, ""), (MIXED, ""), (REPRODUCED, "")], "fails in x, and in some trials in rotation", FAILS_IN),
-    ([(MIXED, "")], "fails in some trials", FAILS_IN),
-    ([(REPRODUCED, ""), (NOT_TESTABLE, "")], "cannot tell", "cannot tell"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("parts", "outcome", "kind"),
+    [
+        ([(REPRODUCED, ""), (REFUTED, MISPRINT), (REFUTED, BEYOND)], "holds, misprint", MISPRINTED),
+        ([(REPRODUCED, ""), (REFUTED, BEYOND)], "holds", HOLDS),
+        ([(REFUTED, BEYOND)], "not computed", "not computed"),
+        ([(WHERE, ""), (REFUTED, MISPRINT)], "holds where stated", "holds where stated"),
+        ([(WHERE, ""), (REFUTED, "")], "fails in rotation", FAILS_IN),
+        ([(REFUTED, ""), (REPRODUCED, BEYOND)], FAILS, FAILS),
+        ([(REPRODUCED, ""), (MIXED, "")], "fails in some trials in rotation", FAILS_IN),
+        (
+            [(REFUTED, ""), (MIXED, ""), (REPRODUCED, "")],
+            "fails in x, and in some trials in rotation",
+            FAILS_IN,
+        ),
+        ([(MIXED, "")], "fails in some trials", FAILS_IN),
+        ([(REPRODUCED, ""), (NOT_TESTABLE, "")], "cannot tell", "cannot tell"),
+    ],
+)
 def test_the_outcome_of_a_claim_follows_from_the_parts_that_the_paper_states(parts, outcome, kind):
     named = ("x", "rotation", "y")
-    found = finding_of("C", "C", "", "", [Part("", verdict, role=role, named=name)
-                                          for name, (verdict, role) in zip(named, parts, strict=False)])  # fmt: skip
+    found = finding_of(
+        "C",
+        "C",
+        "",
+        "",
+        [
+            Part("", verdict, role=role, named=name)
+            for name, (verdict, role) in zip(named, parts, strict=False)
+        ],
+    )
     assert (found.outcome, found.kind) == (outcome, kind) and kind in KINDS
     added = with_failures(found, [failure_of("one", ValueError("planted"))])
     assert added.outcome == (outcome if FAILS in outcome else "not computed")
@@ -92,15 +133,30 @@ def test_the_outcome_of_a_claim_follows_from_the_parts_that_the_paper_states(par
 def test_what_no_case_tests_cannot_tell_whatever_is_shown_beside_it():
     claim = replace(CLAIM, roles={"x": BEYOND}, untested=("whole steps",))
     found = claim.conclude(claim.table_of([{"part": "x", "error": 2.0}] * 20))
-    assert (found.outcome, [part.name for part in found.parts]) == ("cannot tell", ["whole steps", "x"])
+    assert (found.outcome, [part.name for part in found.parts]) == (
+        "cannot tell",
+        ["whole steps", "x"],
+    )
 
 
-CLAIM = Check(key="C99", question="?", cases=lambda study: (), row=lambda study, case: case, parts=["part"],
-              conditions=["tilt"], holds=lambda row: row["error"] < 1.0, says=lambda table: "Found.")  # fmt: skip
+CLAIM = Check(
+    key="C99",
+    question="?",
+    cases=lambda study: (),
+    row=lambda study, case: case,
+    parts=["part"],
+    conditions=["tilt"],
+    holds=lambda row: row["error"] < 1.0,
+    says=lambda table: "Found.",
+)
 
 
 def concluded(*trials, times=LEAST_DECIDED):
-    rows = [dict(zip(("part", "tilt [rad]", "error"), trial, strict=True)) for trial in trials for _ in range(times)]
+    rows = [
+        dict(zip(("part", "tilt [rad]", "error"), trial, strict=True))
+        for trial in trials
+        for _ in range(times)
+    ]
     return CLAIM.conclude(CLAIM.table_of(rows))
 
 
@@ -113,9 +169,19 @@ def test_failures_are_told_apart_by_part_with_their_conditions():
     assert (x.held, x.decided, y.held, y.decided) == (10, 20, 20, 20)
 
 
-@pytest.mark.parametrize(("held", "failed", "verdict"), [
-    (LEAST_DECIDED - 1, 0, NOT_TESTABLE), (LEAST_DECIDED, 0, REPRODUCED), (1, 0, NOT_TESTABLE), (8, 1, MIXED),
-    (3, 1, MIXED), (1, 3, REFUTED), (0, 1, REFUTED), (1, LEAST_DECIDED - 1, REFUTED)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("held", "failed", "verdict"),
+    [
+        (LEAST_DECIDED - 1, 0, NOT_TESTABLE),
+        (LEAST_DECIDED, 0, REPRODUCED),
+        (1, 0, NOT_TESTABLE),
+        (8, 1, MIXED),
+        (3, 1, MIXED),
+        (1, 3, REFUTED),
+        (0, 1, REFUTED),
+        (1, LEAST_DECIDED - 1, REFUTED),
+    ],
+)
 def test_few_trials_reproduce_nothing_but_one_that_fails_counts(held, failed, verdict):
     outcomes = [YES] * held + [NO] * failed + [UNKNOWN] * 3
     part = judge_part("x", table([{"tilt [rad]": 0.0}] * len(outcomes), outcomes))
@@ -124,9 +190,15 @@ def test_few_trials_reproduce_nothing_but_one_that_fails_counts(held, failed, ve
 
 
 def test_a_trial_may_stand_for_many_cases():
-    of = {n: judge_part("x", table([{"impacts": n}] * 2, [YES, UNKNOWN], cases=["impacts"])) for n in (9, 10)}
+    of = {
+        n: judge_part("x", table([{"impacts": n}] * 2, [YES, UNKNOWN], cases=["impacts"]))
+        for n in (9, 10)
+    }
     assert of[9].verdict == NOT_TESTABLE and of[10].verdict == REPRODUCED
-    assert of[10].sentence == "holds in 1 of 1 trials; 1 more cannot tell (10 cases in the trials that can tell)."
+    assert (
+        of[10].sentence
+        == "holds in 1 of 1 trials; 1 more cannot tell (10 cases in the trials that can tell)."
+    )
 
 
 def trials(holds, widths=(1.0, 2.0, 3.0, 4.0)):
@@ -145,7 +217,10 @@ def drawn_by(holds, count=20):
     def draw(region):
         rng = np.random.default_rng(5)
         tilt, width = region.ends("tilt", (0.0, 0.3)), region.ends("width", (1.0, 4.0))
-        rows = [{"tilt [rad]": rng.uniform(*tilt), "width [m]": rng.uniform(*width)} for _ in range(count)]
+        rows = [
+            {"tilt [rad]": rng.uniform(*tilt), "width [m]": rng.uniform(*width)}
+            for _ in range(count)
+        ]
         drawn = table(rows, ()).judged(holds)
         assert all(region.contains(row) for row in drawn.records())
         return drawn
@@ -159,8 +234,12 @@ def test_a_region_that_is_there_is_found_and_confirmed_with_its_counts():
     assert part.region.share == pytest.approx(2 / 3) and part.region.fresh == 20
     assert part.region.searched + part.region.others == part.held
     assert "67% of the tested range" in part.sentence and "more cannot tell" not in part.sentence
-    half = judge_part("x", trials(gentle), drawn_by(lambda row: None if row["width"] > 2.5 else gentle(row), 60))
-    assert half.region.fresh < 60 and f"; {60 - half.region.fresh} more cannot tell" in half.sentence
+    half = judge_part(
+        "x", trials(gentle), drawn_by(lambda row: None if row["width"] > 2.5 else gentle(row), 60)
+    )
+    assert (
+        half.region.fresh < 60 and f"; {60 - half.region.fresh} more cannot tell" in half.sentence
+    )
 
 
 def test_a_region_may_bound_two_conditions():
@@ -169,7 +248,9 @@ def test_a_region_may_bound_two_conditions():
 
 
 def test_a_second_condition_must_pay():
-    region = search_region(trials(lambda row: row["tilt"] <= 0.15 or (row["tilt"] <= 0.2 and row["width"] == 1.0)))
+    region = search_region(
+        trials(lambda row: row["tilt"] <= 0.15 or (row["tilt"] <= 0.2 and row["width"] == 1.0))
+    )
     assert str(region) == "tilt <= 0.15 rad"
 
 
@@ -191,7 +272,9 @@ def test_without_fresh_trials_the_other_half_must_confirm():
 
 
 def test_a_half_without_a_failure_hides_no_range():
-    sizes = table([{"tilt [rad]": float(n)} for n in range(1, 28)], ()).judged(lambda row: row["tilt"] > 2.0)
+    sizes = table([{"tilt [rad]": float(n)} for n in range(1, 28)], ()).judged(
+        lambda row: row["tilt"] > 2.0
+    )
     assert str(judge_part("x", sizes).region) == "tilt >= 4 rad"
 
 
@@ -210,7 +293,9 @@ def test_a_part_that_fails_in_most_trials_may_hold_in_a_range_and_says_both():
     part = judge_part("x", trials(rare), drawn_by(rare))
     assert (part.verdict, str(part.region)) == (WHERE, "tilt <= 0.1 rad")
     assert "holds in 20 of 52 trials; fails in most trials; where tilt <= 0.1 rad" in part.sentence
-    few = judge_part("x", trials(lambda row: row["tilt"] <= 0.03), drawn_by(lambda row: row["tilt"] <= 0.03))
+    few = judge_part(
+        "x", trials(lambda row: row["tilt"] <= 0.03), drawn_by(lambda row: row["tilt"] <= 0.03)
+    )
     assert few.held < LEAST_DECIDED and (few.verdict, few.region) == (REFUTED, None)
 
 
@@ -218,7 +303,11 @@ def test_a_range_may_be_a_single_value_and_fresh_trials_vary_the_others():
     limited = lambda row: row["width"] == 2.0 or row["tilt"] == 0.0  # noqa: E731
     found = trials(limited, widths=(1.0, 2.0))
     part = judge_part("x", found, drawn_by(limited))
-    assert str(part.region) == "width = 2 m" and part.region.share == 0.0 and "tested range" not in part.sentence
+    assert (
+        str(part.region) == "width = 2 m"
+        and part.region.share == 0.0
+        and "tested range" not in part.sentence
+    )
     assert judge_part("x", found, drawn_by(lambda row: row["tilt"] <= 0.2)).verdict == MIXED
 
 

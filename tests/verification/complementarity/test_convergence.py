@@ -19,9 +19,16 @@ from verification.complementarity import convergence as study
 
 BY_SCENE = {case.scene: case for case in study.CASES}
 EVENTS = {
-    "two_link_arm_a": 1, "peg_corner": 3, "peg_hole": 1, "bernoulli_balls": 1, "arm_pushing": 1,
-    "ball_dropped_in_space": 1, "box_dropped_in_space": 2, "cradle_in_space": 2, "arm_meets_a_wall_in_space": 1,
-}  # fmt: skip
+    "two_link_arm_a": 1,
+    "peg_corner": 3,
+    "peg_hole": 1,
+    "bernoulli_balls": 1,
+    "arm_pushing": 1,
+    "ball_dropped_in_space": 1,
+    "box_dropped_in_space": 2,
+    "cradle_in_space": 2,
+    "arm_meets_a_wall_in_space": 1,
+}
 
 
 @cache
@@ -31,12 +38,18 @@ def truth_of(scene: str) -> SceneTruth:
 
 
 @pytest.mark.parametrize("scene", EVENTS)
-def test_the_rigid_world_converges_at_first_order(scene: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_rigid_world_converges_at_first_order(
+    scene: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(study, "scene_truth", lambda *_: truth_of(scene))
     table = study.CONVERGENCE.table(Study(), [BY_SCENE[scene]])
     coarse, fine = table.records()
     assert fine["events"] == EVENTS[scene] and table.holds == (None, True)
-    assert fine["order, positions"] > 0.6 and fine["order, velocities"] > 0.6 and coarse["step"] > 3.9 * fine["step"]
+    assert (
+        fine["order, positions"] > 0.6
+        and fine["order, velocities"] > 0.6
+        and coarse["step"] > 3.9 * fine["step"]
+    )
 
 
 @dataclass(frozen=True)
@@ -51,9 +64,11 @@ class _Halved(RigidConstraints):
 
 @pytest.mark.parametrize("case", study.CASES, ids=lambda case: case.scene)
 def test_a_truth_does_not_depend_on_rounding(case: study.TruthCase) -> None:
-    """Starts that differ by 1e-14 to 1e-12 have the same events and stay within the bound that the truth states.
+    """Starts that differ by 1e-14 to 1e-12 have the same events and stay within the bound that the
+    truth states.
 
-    With the contacts' forces taken one by one, these starts gave bernoulli_balls 1, 6 or more than 60 events.
+    With the contacts' forces taken one by one, these starts gave bernoulli_balls 1, 6 or more than
+    60 events.
     """
     scene = study.scene_of(case.scene)
     truth, start = truth_of(case.scene), System(scene).make_state()
@@ -61,7 +76,9 @@ def test_a_truth_does_not_depend_on_rounding(case: study.TruthCase) -> None:
     rng = np.random.default_rng(0)
     size = 10.0 ** rng.uniform(-14.0, -12.0)
     near = tuple(x * (1.0 + size * rng.uniform(-1.0, 1.0, x.shape)) for x in (start.q, start.v))
-    other = scene_truth(scene, case.duration, case.coupled, start=near, computations=COMPUTATIONS[:1])
+    other = scene_truth(
+        scene, case.duration, case.coupled, start=near, computations=COMPUTATIONS[:1]
+    )
     assert len(other.events) == len(truth.events)
     assert other.events == pytest.approx(truth.events, abs=truth.bound.instant)
     assert np.abs(other.state(time)[0] - truth.state(time)[0]).max() <= truth.bound.position
@@ -76,10 +93,14 @@ def test_a_truth_that_is_not_known_well_enough_is_refused(monkeypatch: pytest.Mo
 
 
 def test_a_wrong_law_does_not_converge() -> None:
-    assert not study.converge(study.TruthCase("peg_corner", 0.36, True, ""), law=_Halved())[1]["holds"]
+    assert not study.converge(study.TruthCase("peg_corner", 0.36, True, ""), law=_Halved())[1][
+        "holds"
+    ]
 
 
 def test_every_scene_of_the_project_has_a_truth_or_a_reason() -> None:
-    assert (set(BY_SCENE) | set(study.WITHOUT_TRUTH)) - set(study.TRUTH_SCENES) == set(scene_names())
+    assert (set(BY_SCENE) | set(study.WITHOUT_TRUTH)) - set(study.TRUTH_SCENES) == set(
+        scene_names()
+    )
     assert set(study.TRUTH_SCENES) <= set(BY_SCENE)
     assert not set(BY_SCENE) & set(study.WITHOUT_TRUTH)

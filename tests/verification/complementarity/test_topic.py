@@ -1,4 +1,5 @@
-"""Extensions, timings, collections of problems, references: what their checks find, and that planted rows turn it."""
+"""Extensions, timings, collections of problems, references: what their checks find, and that
+planted rows turn it."""
 
 from __future__ import annotations
 
@@ -21,7 +22,9 @@ from verification.cost.solvers import DAQP, IAPB, IMPACT_TIMES, KERNEL, LEMKE_KE
 from verification.finding import MIXED, NOT_TESTABLE, REFUTED, REPRODUCED
 
 
-def test_friction_is_coulombs_law_where_all_push_and_never_gains(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_friction_is_coulombs_law_where_all_push_and_never_gains(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setitem(extensions.COUNTS, "quick", 15)
     table = FRICTION.table(Study(), [(e, mu) for e in (0.0, 1.0) for mu in (0.2, 0.8)])
     plastic, elastic = (table.where(e=e).records() for e in (0.0, 1.0))
@@ -37,7 +40,9 @@ def test_unequal_restitution_is_poissons_law_and_never_gains() -> None:
     approaching, mixed = UNEQUAL.table(Study()).records()
     assert max(row["distance from Poisson's law"] for row in (approaching, mixed)) <= 1e-12
     assert max(row["largest change of KE, IAPB"] for row in (approaching, mixed)) <= 1e-12
-    assert approaching["Newton LCP"] <= 1e-12 < mixed["Newton LCP"] and approaching["equalities"] > 0.1
+    assert (
+        approaching["Newton LCP"] <= 1e-12 < mixed["Newton LCP"] and approaching["equalities"] > 0.1
+    )
 
 
 def test_the_references_are_compared_scene_by_scene() -> None:
@@ -47,17 +52,24 @@ def test_the_references_are_compared_scene_by_scene() -> None:
     assert wrong.passed is False and REFERENCES.sentences(wrong)[0].verdict == REFUTED
 
 
-def test_every_way_is_timed_on_every_size_and_gives_the_same_motion(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_way_is_timed_on_every_size_and_gives_the_same_motion(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(timings, "SOLVERS", ("daqp", "lemke"))
     sizes = [Size(family, contacts) for family in ("patch", "pile") for contacts in (1, 3)]
     costs = IMPACT_TIMES.table(Study(), sizes)
     assert set(costs.select(("impacts", "contacts", "solver")).rows) == {
-        (*size, solver) for size in sizes for solver in (KERNEL, IAPB, PRINTED, LEMKE_KERNEL, DAQP, "daqp", "lemke")}
+        (*size, solver)
+        for size in sizes
+        for solver in (KERNEL, IAPB, PRINTED, LEMKE_KERNEL, DAQP, "daqp", "lemke")
+    }
     assert set(costs.column("outcome")) == {"solved"} and min(costs.column("samples")) >= 3
     assert all(row["least"] <= row["median"] <= row["largest"] for row in costs.records())
 
 
-def test_a_wrong_answer_is_not_called_solved_and_a_slow_solver_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_wrong_answer_is_not_called_solved_and_a_slow_solver_is_left_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     original = timings.calls.solver_call
 
     def wrong(case, name):  # type: ignore[no-untyped-def]
@@ -86,7 +98,11 @@ def test_a_folder_of_problems(tmp_path: Path) -> None:
     study, (check, profile) = Study(), collections({"given": tmp_path})
     table = check.table(study)
     one, skew, damaged = table.records()
-    assert (one["problem"], skew["problem"], damaged["problem"]) == ("one.hdf5", "skew.lcp", "damaged.lcp")
+    assert (one["problem"], skew["problem"], damaged["problem"]) == (
+        "one.hdf5",
+        "skew.lcp",
+        "damaged.lcp",
+    )
     assert skew["asymmetry of W"] > 0.1 and (skew["daqp"], skew["lemke"]) == ("refused", "solved")
     assert damaged["daqp"] == "not read" and "size 3 with 2 numbers" in damaged["why not read"]
     assert check.sentences(table)[0].verdict == MIXED and table.holds == (True, True, False)
@@ -98,4 +114,6 @@ def test_a_slow_solver_is_not_asked_for_more_and_a_problem_without_solution_fail
     unsolvable = ImpactProblem.from_delassus([[0.0]], [-1.0], name="unsolvable")
     larger = ImpactProblem.from_delassus(np.eye(2), [-1.0, -1.0], name="larger")
     lines = study_read("few", [StoredProblem(larger), StoredProblem(unsolvable)], longest=0.0).lines
-    assert {line["daqp"] for line in lines} == {"failed", "left out"} and "solved" not in lines[1].values()
+    assert {line["daqp"] for line in lines} == {"failed", "left out"} and "solved" not in lines[
+        1
+    ].values()

@@ -1,4 +1,5 @@
-"""What changes without an effect: nothing where it does nothing, what the law says where it does."""
+"""What changes without an effect: nothing where it does nothing, what the law says where it
+does."""
 
 from __future__ import annotations
 
@@ -21,38 +22,53 @@ def _scene(name: str, duration: float) -> Scene:
 
 def _measured(scene: Scene) -> dict[str, dict[str, Any]]:
     """What was measured, by effect."""
-    return {row["effect"]: row for row in effects_of(scene, rounds=1).records() if row["position"] is not None}
+    return {
+        row["effect"]: row
+        for row in effects_of(scene, rounds=1).records()
+        if row["position"] is not None
+    }
 
 
 def test_without_walls_or_hand_the_peg_goes_elsewhere() -> None:
     found = _measured(_scene("peg_corner", 1.0))
     assert "friction" not in found and "gravity" not in found  # off in this scene
-    # the hand accelerates the peg of 2 kg for a second; with walls it ends in the corner, 10 mm and 8 mm away
+    # the hand accelerates the peg of 2 kg for a second; with walls it ends in the corner, 10 mm and
+    # 8 mm away
     free = 0.5 * np.hypot(0.32, 0.4) / 2.0
-    assert found["wall_contacts"]["position"] == pytest.approx(1e3 * (free - np.hypot(0.01, 0.008)), abs=1.0)
+    assert found["wall_contacts"]["position"] == pytest.approx(
+        1e3 * (free - np.hypot(0.01, 0.008)), abs=1.0
+    )
     assert found["hand_force"]["energy"] == pytest.approx(100.0)
     assert found["clustering"]["position"] == 0.0
     assert found["impulses"]["position"] > 0.1
 
 
 def test_what_the_rounds_do_not_agree_on_is_noise() -> None:
-    assert saved(Times((0.7, 0.9, 0.9, 0.8, 1.3))) == pytest.approx(10.0)  # one round may be disturbed
+    assert saved(Times((0.7, 0.9, 0.9, 0.8, 1.3))) == pytest.approx(
+        10.0
+    )  # one round may be disturbed
     assert saved(Times((0.7, 0.9, 1.1, 1.2, 0.8))) is None and saved(Times((1.0,))) is None
     assert saved(Times((1.3, 1.2, 1.25))) == pytest.approx(-25.0)
 
 
 @pytest.mark.parametrize("name", scene_names())
 def test_an_effect_that_does_nothing_leaves_the_same_bits(name: str) -> None:
-    """Every switch that the scene leaves off is turned on, all at once, and on three scenes one by one.
+    """Every switch that the scene leaves off is turned on, all at once, and on three scenes one by
+    one.
 
-    M is a constant of some scenes in space to rounding alone: turned to each pose it has other last bits.
+    M is a constant of some scenes in space to rounding alone: turned to each pose it has other last
+    bits.
     """
     scene, world = _scene(name, 0.3), find_world("IAPB")
     whole = Loop(scene, world)
     whole.sample()
     spatial = isinstance(scene, SpatialScene)
-    idle = [switch for switch in SWITCHED if not getattr(whole.simulation.world.switches, switch)
-            and not (spatial and switch == "varying_inertia")]
+    idle = [
+        switch
+        for switch in SWITCHED
+        if not getattr(whole.simulation.world.switches, switch)
+        and not (spatial and switch == "varying_inertia")
+    ]
     assert {"joint_damping", "gravity", "clustering"} & {*idle}
     alone = idle if name in ("peg_corner", "arm_obstacles", "peg_hole_space") else ()
     for switches in (*((switch,) for switch in alone), tuple(idle)):
@@ -64,8 +80,14 @@ def test_an_effect_that_does_nothing_leaves_the_same_bits(name: str) -> None:
 
 def test_a_wall_that_is_never_reached_changes_nothing() -> None:
     """At 0.5 m/s the cart ends 50 mm before the wall."""
-    cart = {"name": "cart", "joint": "prismatic", "axis": [1, 0], "mass": 1.0, "velocity": [0.5],
-            "shapes": [{"kind": "circle", "radius": 0.05}]}
+    cart = {
+        "name": "cart",
+        "joint": "prismatic",
+        "axis": [1, 0],
+        "mass": 1.0,
+        "velocity": [0.5],
+        "shapes": [{"kind": "circle", "radius": 0.05}],
+    }
     wall = {"name": "wall", "kind": "half_plane", "point": [0.2, 0], "normal": [-1, 0]}
     contact = {"friction": 0.5, "stiffness": 1e3, "damping": 1}
     scene = scene_of([cart], [wall], rate=500.0, duration=0.2, contact=contact)

@@ -1,4 +1,5 @@
-"""Steps and impacts over their size: scenes raced against MuJoCo are the same and rest; growth, budgets, rates."""
+"""Steps and impacts over their size: scenes raced against MuJoCo are the same and rest; growth,
+budgets, rates."""
 
 from __future__ import annotations
 
@@ -38,7 +39,9 @@ def test_our_scene_rests_and_carries_the_load(name: str) -> None:
     assert loop.contacts == 4.0
     assert loop.moved < 1e-12
     simulation = loop.simulation
-    load = simulation.port.applied - (0.0 if name.startswith("peg") else np.array([0, 0, 9.81, 0, 0, 0]))
+    load = simulation.port.applied - (
+        0.0 if name.startswith("peg") else np.array([0, 0, 9.81, 0, 0, 0])
+    )
     np.testing.assert_allclose(simulation.state.penalty_force, -load, atol=1e-9)
 
 
@@ -47,7 +50,9 @@ def test_a_race_states_contacts_of_both_and_keeps_every_solver() -> None:
     races = list(steps.race(Study(), "peg in the corner", 32))
     assert {row["MuJoCo's contacts"] for row in races} == {8.0}  # at both ends of each edge
     assert {row["MuJoCo's solver"] for row in races} == set(steps.SOLVERS)
-    assert {row["iapb's contacts"] for row in races} == {4.0} and max(row["MuJoCo's drift"] for row in races) < 1e-6
+    assert {row["iapb's contacts"] for row in races} == {4.0} and max(
+        row["MuJoCo's drift"] for row in races
+    ) < 1e-6
 
 
 def test_without_mujoco_the_race_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -57,8 +62,8 @@ def test_without_mujoco_the_race_says_so(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_pairs_tested_grow_linearly_where_all_pairs_grow_quadratically() -> None:
-    """All pairs give 2 in the limit; the density of the field, and with it the neighbours of a disc, changes a little.
-    """
+    """All pairs give 2 in the limit; the density of the field, and with it the neighbours of a
+    disc, changes a little."""
     costs = steps.BODIES.table(Study(), (20, 50, 100))
     assert growth.power_law(costs.column("bodies"), costs.column("pairs tested")) < 1.2
     assert growth.power_law(costs.column("bodies"), costs.column("pairs of shapes")) > 1.9
@@ -66,30 +71,53 @@ def test_pairs_tested_grow_linearly_where_all_pairs_grow_quadratically() -> None
 
 def test_the_most_contacts_are_the_last_in_time() -> None:
     keys = ("method", "deadline", "coordinates", "contacts", "late calls")
-    rows = [("a", growth.MILLISECOND, 3, contacts, late) for contacts, late in (
-        (6, 0), (12, growth.ALLOWED), (30, growth.ALLOWED + 1))]
+    rows = [
+        ("a", growth.MILLISECOND, 3, contacts, late)
+        for contacts, late in ((6, 0), (12, growth.ALLOWED), (30, growth.ALLOWED + 1))
+    ]
     rows += [("a", growth.PAPER_STEP, 3, 30, 0), ("b", growth.MILLISECOND, 3, 6, 9)]
     trials = table_from(dict(zip(keys, row, strict=True)) for row in rows)
     assert growth.most_contacts(trials) == {"a": {3: 12}, "b": {3: 0}}
 
 
 def test_exponents_and_the_steepest_range_are_those_of_the_method_and_the_axis() -> None:
-    power = {growth.FACTORED: (1.0, 2.0), PRINTED: (0.5, 3.0)}  # over contacts and coordinates, above the smallest size
+    power = {
+        growth.FACTORED: (1.0, 2.0),
+        PRINTED: (0.5, 3.0),
+    }  # over contacts and coordinates, above the smallest size
     sizes = [(12, c) for c in (30, 60, 120)] + [(d, 60) for d in (6, 24)]
     table = table_from(
-        {"method": method, "coordinates": d, "contacts": c, "time [µs]": (max(c, 60) / 60) ** a * (d / 12) ** b}
-        for method, (a, b) in power.items() for d, c in sizes)  # fmt: skip
+        {
+            "method": method,
+            "coordinates": d,
+            "contacts": c,
+            "time [µs]": (max(c, 60) / 60) ** a * (d / 12) ** b,
+        }
+        for method, (a, b) in power.items()
+        for d, c in sizes
+    )
     for method, (over_contacts, over_coordinates) in power.items():
         row = growth.fitted(table, method, "contacts")
-        assert (row["steepest from"], row["to"], row["there"]) == (60, 120, pytest.approx(over_contacts))
+        assert (row["steepest from"], row["to"], row["there"]) == (
+            60,
+            120,
+            pytest.approx(over_contacts),
+        )
         row = growth.fitted(table, method, "coordinates")
-        assert (row["exponent"], row["there"]) == (pytest.approx(over_coordinates), pytest.approx(over_coordinates))
+        assert (row["exponent"], row["there"]) == (
+            pytest.approx(over_coordinates),
+            pytest.approx(over_coordinates),
+        )
 
 
 def test_every_budget_is_passive_and_the_whole_one_meets_restitution() -> None:
-    rows = BUDGET_ROWS.table(Study(), [Stopped(12, 60, budget) for budget in (0, 3, 7, 8)]).records()
+    rows = BUDGET_ROWS.table(
+        Study(), [Stopped(12, 60, budget) for budget in (0, 3, 7, 8)]
+    ).records()
     assert max(row["largest relative gain"] for row in rows) <= 0.0
-    assert [row["largest residual"] < 1e-13 for row in rows] == [row["budget"] == row["rank"] for row in rows]
+    assert [row["largest residual"] < 1e-13 for row in rows] == [
+        row["budget"] == row["rank"] for row in rows
+    ]
     none, few, _, every = (row["share of the loss"] for row in rows)
     assert none == 0.0 < few < every == pytest.approx(1.0)
 
@@ -100,4 +128,6 @@ def test_sizes_are_timed_by_both_methods() -> None:
     timed = [(row["method"], row["contacts"]) for row in found]
     assert timed == [(growth.FACTORED, 4), (PRINTED, 4), (growth.FACTORED, 600)]
     assert all(0.0 < row["lower quartile [µs]"] <= row["upper quartile [µs]"] for row in found)
-    assert {(12, contacts) for contacts in growth.FACTORS} <= set(growth.SIZES)  # the printed formula has targets there
+    assert {(12, contacts) for contacts in growth.FACTORS} <= set(
+        growth.SIZES
+    )  # the printed formula has targets there

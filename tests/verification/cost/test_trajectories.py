@@ -1,4 +1,5 @@
-"""Whole motions: the truth has no error, a faulty motion has its own, failures and time-outs stay on record."""
+"""Whole motions: the truth has no error, a faulty motion has its own, failures and time-outs stay
+on record."""
 
 from __future__ import annotations
 
@@ -35,7 +36,9 @@ def test_the_truth_ends_as_the_parabolas_do(judge: study.Judge, true_run: Run) -
     np.testing.assert_allclose(true_run.v[-1, :3], [0.0, 0.0, -0.1452010665010186], atol=1e-9)
     errors, note = judge.errors(true_run)
     assert note == f"position, energy {study.BELOW}"
-    assert {name: errors[name] for name in judge.bounds} == judge.bounds  # what the truth is worth, and no better
+    assert {
+        name: errors[name] for name in judge.bounds
+    } == judge.bounds  # what the truth is worth, and no better
     assert 0.0 < max(judge.bounds.values()) < 1e-6
 
 
@@ -48,10 +51,17 @@ def test_a_motion_that_is_off_is_off_by_as_much(judge: study.Judge, true_run: Ru
     assert errors["signed energy"] == -errors["energy"] < 0.0
 
 
-def test_a_turn_about_the_center_is_an_error_of_the_point_beside_it(judge: study.Judge, true_run: Run) -> None:
+def test_a_turn_about_the_center_is_an_error_of_the_point_beside_it(
+    judge: study.Judge, true_run: Run
+) -> None:
     half_turn = np.array([0.0, 0.0, 1.0, 0.0])  # about z
-    turned = replace(true_run, q=np.concatenate([true_run.q[:, :3], np.tile(half_turn, (len(true_run.q), 1))], axis=1))
-    assert judge.errors(turned)[0]["position"] == pytest.approx(1.0)  # a length, from half of it to minus half of it
+    turned = replace(
+        true_run,
+        q=np.concatenate([true_run.q[:, :3], np.tile(half_turn, (len(true_run.q), 1))], axis=1),
+    )
+    assert judge.errors(turned)[0]["position"] == pytest.approx(
+        1.0
+    )  # a length, from half of it to minus half of it
 
 
 def test_failures_and_time_outs_are_records(judge: study.Judge, true_run: Run) -> None:
@@ -80,8 +90,9 @@ def test_impulses_meet_the_truth_better_with_every_step(judge: study.Judge) -> N
 def test_no_impact_is_at_a_multiple_of_a_step(name: str) -> None:
     """Such a run is exact by chance, and its world seems better than it is.
 
-    A step that misses an impact by a share r of itself has r times the usual error of the instant: half a hundredth is
-    the least that is let through, on the peg at the finest step; a scene that is not shifted has 1e-13.
+    A step that misses an impact by a share r of itself has r times the usual error of the instant:
+    half a hundredth is the least that is let through, on the peg at the finest step; a scene that
+    is not shifted has 1e-13.
     """
     scene = study.scene_of(name)
     instants = np.array(scene_truth(scene, scene.duration).events)

@@ -1,4 +1,5 @@
-"""Accuracy against time: the impacts have one truth for all methods, the records hide nothing, a budget is kept."""
+"""Accuracy against time: the impacts have one truth for all methods, the records hide nothing, a
+budget is kept."""
 
 from __future__ import annotations
 
@@ -17,32 +18,45 @@ from verification.cost.problems import patch, pile
 from verification.impacts import ImpactCase, timed_problems
 from verification.table import Table
 
-PROBLEMS = [problem for size in ((1, 3), (4, 3), (20, 6), (60, 12)) for problem in timed_problems(*size)]
+PROBLEMS = [
+    problem for size in ((1, 3), (4, 3), (20, 6), (60, 12)) for problem in timed_problems(*size)
+]
 
 
 @pytest.mark.parametrize("problem", PROBLEMS, ids=lambda problem: problem.label)
 def test_daqp_solves_every_hard_impact_of_equalities(problem: ImpactCase) -> None:
-    """Equalities and complementarity have one answer, and no rival fails because of the tolerance that we give it."""
+    """Equalities and complementarity have one answer, and no rival fails because of the tolerance
+    that we give it."""
     J, v = problem.contact_jacobian, problem.velocity
     truth = np.array([float(x) for x in problem.truth])
-    assert np.abs(J @ truth + problem.restitution * (J @ v)).max() <= 1e-12 * np.abs(J).max() * np.abs(v).max()
+    assert (
+        np.abs(J @ truth + problem.restitution * (J @ v)).max()
+        <= 1e-12 * np.abs(J).max() * np.abs(v).max()
+    )
     for _ in range(2):
         assert problem.distance(daqp_call(problem)(), truth) <= 1e-5
 
 
 @pytest.mark.parametrize("seed", [0, 22, 20050601])
-def test_iapb_and_complementarity_agree_on_the_patches_and_piles_that_they_are_timed_on(seed: int) -> None:
+def test_iapb_and_complementarity_agree_on_the_patches_and_piles_that_they_are_timed_on(
+    seed: int,
+) -> None:
     for make in (patch, pile):
         for contacts in (1, 2, 3, 4, 6, 20):
             case = make(contacts, np.random.default_rng([seed, contacts]))
             off = kernel_call(case)() - daqp_call(case)()
-            assert np.linalg.norm(off) <= 1e-9 * np.linalg.norm(case.velocity), (case.family, contacts)
+            assert np.linalg.norm(off) <= 1e-9 * np.linalg.norm(case.velocity), (
+                case.family,
+                contacts,
+            )
 
 
 @pytest.fixture(scope="module")
 def measured() -> Table:
     seen: list[tuple[int, int]] = []
-    found = study.work_precision([(4, 3)], rounds=3, progress=lambda done, of: seen.append((done, of)))
+    found = study.work_precision(
+        [(4, 3)], rounds=3, progress=lambda done, of: seen.append((done, of))
+    )
     assert seen == [(k, 9) for k in range(10)]
     return found
 
@@ -53,26 +67,57 @@ def test_a_small_study_is_complete_and_its_answers_are_right(measured: Table) ->
     assert min(measured.where(outcome="ok").column("time")) > 0.0
     ours = measured.where(method=study.IAPB, work="all rows")
     assert set(ours.column("outcome")) == {"ok"}
-    assert max(ours.column("relative error")) < 1e-12 and max(ours.column("relative energy gain")) == 0.0
-    one, two = (max(measured.where(method=study.IAPB, work=rows).column("relative error"))
-                for rows in ("1 row", "2 rows"))
+    assert (
+        max(ours.column("relative error")) < 1e-12
+        and max(ours.column("relative energy gain")) == 0.0
+    )
+    one, two = (
+        max(measured.where(method=study.IAPB, work=rows).column("relative error"))
+        for rows in ("1 row", "2 rows")
+    )
     assert one > two > 1e-12
-    assert max(measured.where(method=study.SWEEPS, work="1024 sweeps").column("relative error")) < one
+    assert (
+        max(measured.where(method=study.SWEEPS, work="1024 sweeps").column("relative error")) < one
+    )
 
 
 def rows_of(ways: dict[str, list[tuple[float, ...]]]) -> Table:
-    """The rows of ways of "method, work": (time [µs], error, gain or nothing) on each impact of one size."""
-    return study.ACCURACY.table_of([
-        {"contacts": 4, "coordinates": 3, "problem": str(k), "method": way.split(", ")[0], "work": way.split(", ")[1],
-         "called": study.COMPILED, "time [µs]": time, "relative error": error, "relative energy gain": sum(gain),
-         "failed after [µs]": time, "outcome": "ok" if time < 1e4 else study.TOO_SLOW}
-        for way, found in ways.items() for k, (time, error, *gain) in enumerate(found)])
+    """The rows of ways of "method, work": (time [µs], error, gain or nothing) on each impact of one
+    size."""
+    return study.ACCURACY.table_of(
+        [
+            {
+                "contacts": 4,
+                "coordinates": 3,
+                "problem": str(k),
+                "method": way.split(", ")[0],
+                "work": way.split(", ")[1],
+                "called": study.COMPILED,
+                "time [µs]": time,
+                "relative error": error,
+                "relative energy gain": sum(gain),
+                "failed after [µs]": time,
+                "outcome": "ok" if time < 1e4 else study.TOO_SLOW,
+            }
+            for way, found in ways.items()
+            for k, (time, error, *gain) in enumerate(found)
+        ]
+    )
 
 
-KNOWN = rows_of({way: [found] * 2 for way, found in {
-    "IAPB, 1 row": (1.0, 0.5), "IAPB, all rows": (3.0, 1e-15), "Gauss-Seidel, 4 sweeps": (0.4, 0.1),
-    "Gauss-Seidel, 64 sweeps": (2.0, 1e-10, 1e-3), "Lemke, all pivots": (2.5, 1e-11), "slow, all": (1e5, 1e-16),
-}.items()})
+KNOWN = rows_of(
+    {
+        way: [found] * 2
+        for way, found in {
+            "IAPB, 1 row": (1.0, 0.5),
+            "IAPB, all rows": (3.0, 1e-15),
+            "Gauss-Seidel, 4 sweeps": (0.4, 0.1),
+            "Gauss-Seidel, 64 sweeps": (2.0, 1e-10, 1e-3),
+            "Lemke, all pivots": (2.5, 1e-11),
+            "slow, all": (1e5, 1e-16),
+        }.items()
+    }
+)
 
 
 def test_the_choice_is_in_time_makes_no_energy_and_is_as_exact_as_can_be() -> None:
@@ -81,7 +126,9 @@ def test_the_choice_is_in_time_makes_no_energy_and_is_as_exact_as_can_be() -> No
         return None if found is None else (found.method, found.work)
 
     assert chosen(3e-7) is None
-    assert chosen(5e-7) == chosen(2e-6) == (study.SWEEPS, "4 sweeps")  # the more exact one makes energy
+    assert (
+        chosen(5e-7) == chosen(2e-6) == (study.SWEEPS, "4 sweeps")
+    )  # the more exact one makes energy
     assert chosen(2.6e-6) == chosen(1.0) == ("Lemke", "all pivots")  # below 1e-9 the faster one
     nearest = study.choose(KNOWN, 5e-7, 4, 3)
     assert nearest is not None and not nearest.enough and "no method solves half" in str(nearest)
@@ -93,7 +140,11 @@ def test_a_cell_names_no_method_that_solves_less_than_half() -> None:
     table = study.choices(KNOWN)
     assert table.column("method") == ["none", *["Lemke"] * 4]
     assert table.column("nearest") == ["Gauss-Seidel, 4 sweeps: 0.1", *[None] * 4]
-    assert all(row["share solved"] >= 50.0 and row["error"] <= study.SOLVED for row in table.records() if row["time"])
+    assert all(
+        row["share solved"] >= 50.0 and row["error"] <= study.SOLVED
+        for row in table.records()
+        if row["time"]
+    )
 
 
 def chosen_from(ways: dict[str, list[tuple[float, ...]]]) -> study.Choice:
@@ -104,8 +155,12 @@ def chosen_from(ways: dict[str, list[tuple[float, ...]]]) -> study.Choice:
 
 def test_impacts_without_an_answer_in_time_are_not_solved() -> None:
     good, bad, late = (2.0, 1e-6), (2.0, 0.5), (1e5, 0.0)
-    for found, share, solved in (([good, late], 0.5, 0.5), ([good, good, bad, bad], 1.0, 0.5),
-                                 ([good, late, late], 1 / 3, 1 / 3), ([good, bad, late, late], 0.5, 0.25)):
+    for found, share, solved in (
+        ([good, late], 0.5, 0.5),
+        ([good, good, bad, bad], 1.0, 0.5),
+        ([good, late, late], 1 / 3, 1 / 3),
+        ([good, bad, late, late], 0.5, 0.25),
+    ):
         choice = chosen_from({"Lemke, all pivots": found})
         assert (choice.share, choice.solved, choice.enough) == (share, solved, solved >= 0.5)
         assert choice.time == pytest.approx(2e-6) and ": 2 µs an impact" in str(choice)
@@ -114,11 +169,20 @@ def test_impacts_without_an_answer_in_time_are_not_solved() -> None:
 
 
 def test_a_rival_wins_an_impact_only_where_it_is_faster_and_as_exact() -> None:
-    lost = study.lost_to_rivals(rows_of({
-        "IAPB, all rows": [(3.0, 1e-15), (9.0, 1e-3)], "IAPB, 1 row": [(1.0, 1e-15), (1.0, 1e-15)],
-        "Lemke, all pivots": [(4.0, 1e-15), (6.0, 1e-3)], "Gauss-Seidel, 4 sweeps": [(2.0, 1e-5), (3.0, 5e-4)]}))
+    lost = study.lost_to_rivals(
+        rows_of(
+            {
+                "IAPB, all rows": [(3.0, 1e-15), (9.0, 1e-3)],
+                "IAPB, 1 row": [(1.0, 1e-15), (1.0, 1e-15)],
+                "Lemke, all pivots": [(4.0, 1e-15), (6.0, 1e-3)],
+                "Gauss-Seidel, 4 sweeps": [(2.0, 1e-5), (3.0, 5e-4)],
+            }
+        )
+    )
     assert lost.select(("problem", "solver", "time", "IAPB", "ratio")).rows == (
-        ("1", "Lemke", 6.0, 9.0, 1.5), ("1", "Gauss-Seidel", 3.0, 9.0, 3.0))
+        ("1", "Lemke", 6.0, 9.0, 1.5),
+        ("1", "Gauss-Seidel", 3.0, 9.0, 3.0),
+    )
 
 
 def test_a_solver_that_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -126,26 +190,46 @@ def test_a_solver_that_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch
         raise ImportError("no quantecon")
 
     monkeypatch.setattr(calls, "import_lcp_lemke", missing)
-    found = study.work_precision([(1, 3)], 3, [way for way in study.WAYS if way.method == study.LEMKE])
+    found = study.work_precision(
+        [(1, 3)], 3, [way for way in study.WAYS if way.method == study.LEMKE]
+    )
     assert all("quantecon" in outcome for outcome in found.column("outcome"))
 
 
 def test_a_size_is_measured_when_asked_for() -> None:
     compiled, python = which_method(1.0, 2, 3, rounds=3)
-    assert (compiled.called, compiled.share) == (study.COMPILED, 1.0) and compiled.largest < 1e-9 and python.time > 0.0
+    assert (
+        (compiled.called, compiled.share) == (study.COMPILED, 1.0)
+        and compiled.largest < 1e-9
+        and python.time > 0.0
+    )
 
 
-@pytest.mark.parametrize(("named", "given"), [
-    ("budget", (0.0, 2, 3)), ("budget", (np.inf, 2, 3)), ("budget", ("1", 2, 3)), ("budget", (None, 2, 3)),
-    ("contacts", (1.0, 0, 3)), ("contacts", (1.0, 2.5, 3)), ("contacts", (1.0, True, 3)),
-    ("coordinates", (1.0, 2, 3.0)), ("coordinates", (1.0, 2, "3")), ("contacts", (1.0, 10**30, 3)),
-    ("rounds", (1.0, 2, 3, 0)), ("rounds", (1.0, 2, 3, "x"))])  # fmt: skip
+@pytest.mark.parametrize(
+    ("named", "given"),
+    [
+        ("budget", (0.0, 2, 3)),
+        ("budget", (np.inf, 2, 3)),
+        ("budget", ("1", 2, 3)),
+        ("budget", (None, 2, 3)),
+        ("contacts", (1.0, 0, 3)),
+        ("contacts", (1.0, 2.5, 3)),
+        ("contacts", (1.0, True, 3)),
+        ("coordinates", (1.0, 2, 3.0)),
+        ("coordinates", (1.0, 2, "3")),
+        ("contacts", (1.0, 10**30, 3)),
+        ("rounds", (1.0, 2, 3, 0)),
+        ("rounds", (1.0, 2, 3, "x")),
+    ],
+)
 def test_a_wrong_budget_or_size_is_named(named: str, given: tuple[Any, ...]) -> None:
     with pytest.raises(ArgumentError) as caught:
         which_method(*given)
     assert caught.value.argument == named
 
 
-@pytest.mark.parametrize(("text", "seconds"), [("50us", 5e-5), ("0.5 ms", 5e-4), ("1e-4s", 1e-4), ("3µs", 3e-6)])
+@pytest.mark.parametrize(
+    ("text", "seconds"), [("50us", 5e-5), ("0.5 ms", 5e-4), ("1e-4s", 1e-4), ("3µs", 3e-6)]
+)
 def test_budgets_are_read(text: str, seconds: float) -> None:
     assert seconds_of(text) == pytest.approx(seconds)

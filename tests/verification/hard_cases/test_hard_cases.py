@@ -1,4 +1,5 @@
-"""The verdict of every hard case is held: the engine stays stable where it is, and verdicts tell methods apart."""
+"""The verdict of every hard case is held: the engine stays stable where it is, and verdicts tell
+methods apart."""
 
 from __future__ import annotations
 
@@ -8,7 +9,13 @@ import pytest
 
 from verification.hard_cases import HARD_CASES, HardCase, TrajectoryCase, judge
 from verification.hard_cases import judge_hard_case as judged
-from verification.hard_cases.case import DEPENDS_ON_ROUNDING, NEWTON_COULOMB, NOT_TRIED, STABLE, AnyCase
+from verification.hard_cases.case import (
+    DEPENDS_ON_ROUNDING,
+    NEWTON_COULOMB,
+    NOT_TRIED,
+    STABLE,
+    AnyCase,
+)
 from verification.table import Row
 
 # Where the engine is not stable, and says so: springs read once a step pass a blow on with a gain.
@@ -46,7 +53,8 @@ def test_a_fault_of_a_tenth_in_the_answer_is_seen(name: str) -> None:
 
 
 def _with_a_fault(case: AnyCase, method: str, size: float) -> str:
-    """The verdict on the answer with a fault of that relative size, of all faults the kindest one."""
+    """The verdict on the answer with a fault of that relative size, of all faults the kindest
+    one."""
     if isinstance(case, TrajectoryCase):
         run = judge.faulty_motion(judge.run_in_world(case.scene, method), size)
         with pytest.MonkeyPatch.context() as patch:
@@ -62,24 +70,29 @@ def _with_a_fault(case: AnyCase, method: str, size: float) -> str:
     return "stable" if "stable" in verdicts else verdicts[0]
 
 
-@pytest.mark.parametrize(("name", "method", "verdict"), [
-    ("mass_ratio", "gram_pinv", "gains energy"),
-    ("printed_formula_gains", "gram_pinv", DEPENDS_ON_ROUNDING),
-    ("kahan_rows", "damped", "restitution unmet"),
-    ("tiny_lever_arm", "gram_pinv", "wrong motion"),
-    ("hilbert_rows", "gram_cholesky", "refused"),
-    ("light_direction", judge.WITHOUT_CLAMP, "gains energy"),
-    ("double_pendulum_with_friction", NEWTON_COULOMB, "gains energy"),
-    ("wall_beyond_the_bound", "PB", "gains energy"),
-    ("chatter", "PB", "wrong motion"),
-])
+@pytest.mark.parametrize(
+    ("name", "method", "verdict"),
+    [
+        ("mass_ratio", "gram_pinv", "gains energy"),
+        ("printed_formula_gains", "gram_pinv", DEPENDS_ON_ROUNDING),
+        ("kahan_rows", "damped", "restitution unmet"),
+        ("tiny_lever_arm", "gram_pinv", "wrong motion"),
+        ("hilbert_rows", "gram_cholesky", "refused"),
+        ("light_direction", judge.WITHOUT_CLAMP, "gains energy"),
+        ("double_pendulum_with_friction", NEWTON_COULOMB, "gains energy"),
+        ("wall_beyond_the_bound", "PB", "gains energy"),
+        ("chatter", "PB", "wrong motion"),
+    ],
+)
 def test_the_verdict_can_be_other_than_stable(name: str, method: str, verdict: str) -> None:
     case = HARD_CASES[name]()
     assert method in judge.methods_for(case)
     assert (found := judged(case, method))["outcome"] == verdict, found
 
 
-def test_what_forms_the_delassus_matrix_of_ten_thousand_contacts_is_not_tried_and_its_row_says_so() -> None:
+def test_what_forms_the_delassus_matrix_of_ten_thousand_contacts_is_not_tried_and_its_row_says_so() -> (
+    None
+):
     case = HARD_CASES["ten_thousand_contacts"]()
     for method in ("gram_pinv", "gram_cholesky", "damped"):
         row = judged(case, method)

@@ -40,7 +40,9 @@ def test_poissons_law_on_the_bar() -> None:
     assert pushing >= 1 and _impact("bar_with_unequal_restitution").truth.rank == pushing
 
 
-def test_friction_meets_restitution_exactly_and_gives_the_energy_back_to_the_certified_digit() -> None:
+def test_friction_meets_restitution_exactly_and_gives_the_energy_back_to_the_certified_digit() -> (
+    None
+):
     case = _impact("double_pendulum_with_friction")
     assert isinstance(case, FrictionalCase)
     row, before = _exact(case.contact_jacobian[0]), _exact(case.velocity)
@@ -61,7 +63,8 @@ def test_the_chattering_ball_reaches_a_quarter_of_the_height_each_time(bounce: i
 
 
 def test_restitution_is_read_from_the_record_of_the_collisions() -> None:
-    """The engine's collisions meet e exactly; a planted fault, the impulse a tenth too large, does not."""
+    """The engine's collisions meet e exactly; a planted fault, the impulse a tenth too large, does
+    not."""
     case = HARD_CASES["chatter"]()
     assert isinstance(case, TrajectoryCase)
     run = run_in_world(case.scene, "IAPB")
@@ -72,12 +75,15 @@ def test_restitution_is_read_from_the_record_of_the_collisions() -> None:
     assert restitution_residual(faulty) == pytest.approx(0.1 / 1.1)
     weaker = replace(found, v_plus=found.v_plus - 0.1 * (found.v_plus - found.v_minus))
     assert restitution_residual(replace(run, impacts=weaker)) == pytest.approx(0.1 / 0.9)
-    assert judge_hard_case(case, "IAPB", lambda scene, world: faulty)["outcome"] == "restitution unmet"
+    assert (
+        judge_hard_case(case, "IAPB", lambda scene, world: faulty)["outcome"] == "restitution unmet"
+    )
     assert np.isnan(restitution_residual(run_in_world(case.scene, "PB")))
 
 
 def test_the_break_shot_is_that_of_billiards() -> None:
-    """Striker: 1 − 4 n²/(1 + 2 n²) of its speed, with n = 4/5 between the balls' line and the way; energy kept."""
+    """Striker: 1 − 4 n²/(1 + 2 n²) of its speed, with n = 4/5 between the balls' line and the way;
+    energy kept."""
     case = _impact("break_shot")
     after, n = case.truth.velocity, Fraction(4, 5)
     assert after[0] == -(1 - 4 * n**2 / (1 + 2 * n**2)) and after[1] == 0
@@ -86,8 +92,13 @@ def test_the_break_shot_is_that_of_billiards() -> None:
 
 
 def test_all_stop_or_return_as_by_hand() -> None:
-    assert _impact("touching_cradle_impact").truth.velocity == (Fraction(-3, 5), *(Fraction(2, 5),) * 4)
-    assert _impact("wedged_peg").truth.velocity == (0, 0, 0) and _impact("wedged_peg").truth.rank == 3
+    assert _impact("touching_cradle_impact").truth.velocity == (
+        Fraction(-3, 5),
+        *(Fraction(2, 5),) * 4,
+    )
+    assert (
+        _impact("wedged_peg").truth.velocity == (0, 0, 0) and _impact("wedged_peg").truth.rank == 3
+    )
     stack, wedge = _impact("stack_of_mass_ratio"), _impact("wedge")
     masses = _exact(np.diag(stack.mass_matrix))
     assert set(stack.truth.velocity) == {masses @ _exact(stack.velocity) / sum(masses)}
@@ -112,15 +123,24 @@ def test_the_superball_returns_its_point_of_contact() -> None:
 
 @pytest.mark.parametrize(
     ("name", "point"),
-    [("sleeping_top", ("0", "0", "-1/2")), ("rolling_coin", ("3/5", "0", "-4/5")),
-     ("rattleback", ("1/2", "0", "-1/4"))],
+    [
+        ("sleeping_top", ("0", "0", "-1/2")),
+        ("rolling_coin", ("3/5", "0", "-4/5")),
+        ("rattleback", ("1/2", "0", "-1/4")),
+    ],
 )
-def test_a_held_point_rests_and_keeps_the_angular_momentum_about_it(name: str, point: tuple[str, ...]) -> None:
+def test_a_held_point_rests_and_keeps_the_angular_momentum_about_it(
+    name: str, point: tuple[str, ...]
+) -> None:
     case, r = _impact(name), _exact(point)
-    after, momentum = _exact(case.truth.velocity), _exact(case.mass_matrix) @ (
-        _exact(case.truth.velocity) - _exact(case.velocity))
+    after, momentum = (
+        _exact(case.truth.velocity),
+        _exact(case.mass_matrix) @ (_exact(case.truth.velocity) - _exact(case.velocity)),
+    )
     assert not (after[:3] + np.cross(after[3:], r)).any()
-    assert not (momentum[3:] - np.cross(r, momentum[:3])).any()  # about the point at r from the centre of mass
+    assert not (
+        momentum[3:] - np.cross(r, momentum[:3])
+    ).any()  # about the point at r from the centre of mass
 
 
 def test_the_top_sleeps_and_the_rattleback_spins_by_its_product_of_inertia() -> None:
@@ -136,7 +156,8 @@ def test_the_top_sleeps_and_the_rattleback_spins_by_its_product_of_inertia() -> 
 
 
 def test_the_pushed_plate_slides_sticks_once_and_slides_on() -> None:
-    """It obeys m x'' = K d + B d' − μ m g while it slides, d the spring's depth; it sticks where these forces are less.
+    """It obeys m x'' = K d + B d' − μ m g while it slides, d the spring's depth; it sticks where
+    these forces are less.
 
     The swing decays: from one period 2π/Ω to the next by exp(−2π a/Ω), a = B/2m, Ω² = K/m − a².
     """
@@ -154,5 +175,7 @@ def test_the_pushed_plate_slides_sticks_once_and_slides_on() -> None:
     assert len(sticks) == 2 and pressed[~moving].max() < 1.01 * limit
     decay = 0.5 * damper / mass
     period = 2.0 * np.pi / np.sqrt(stiffness / mass - decay**2)
-    swing = [np.ptp(depth[(time > 0.1 + k * period) & (time < 0.1 + (k + 1) * period)]) for k in range(2)]
+    swing = [
+        np.ptp(depth[(time > 0.1 + k * period) & (time < 0.1 + (k + 1) * period)]) for k in range(2)
+    ]
     assert swing[1] / swing[0] == pytest.approx(np.exp(-decay * period), rel=1e-3)

@@ -1,4 +1,5 @@
-"""Textbook resolvers whose contacts only push, and resolvers with one planted bug each, by the law that detects it.
+"""Textbook resolvers whose contacts only push, and resolvers with one planted bug each, by the law
+that detects it.
 
 The report shows one fault per law (`verification.laws.planted`); these are the others.
 """
@@ -27,7 +28,8 @@ def reversed_velocity(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
 
 
 def returns_too_much(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Gives 1e-4 more of the impulse than e requires; rationals, rounded once, give the same bits under every BLAS."""
+    """Gives 1e-4 more of the impulse than e requires; rationals, rounded once, give the same bits
+    under every BLAS."""
     before = [Fraction(x) for x in v.tolist()]
     exact = exact_impact(M, J, v, e).velocity
     return np.array([float(a + TOO_MUCH * (b - a)) for a, b in zip(before, exact, strict=True)])
@@ -46,13 +48,23 @@ def makes_stale_jacobian() -> Resolver:
 # name -> the law that must detect it, and how to make it
 BUGS: dict[str, tuple[str, Callable[[], Resolver]]] = {
     "reversed velocity": ("impulse_range", lambda: reversed_velocity),
-    "drops separating rows": ("restitution", lambda: lambda M, J, v, e: sound_resolver(M, J[J @ v < 0.0], v, e)),
+    "drops separating rows": (
+        "restitution",
+        lambda: lambda M, J, v, e: sound_resolver(M, J[J @ v < 0.0], v, e),
+    ),
     "printed formula": ("kinetic_energy", lambda: gram_pinv),
-    "single precision": ("restitution", lambda: lambda *given: sound_resolver(*given).astype(np.float32).astype(float)),
-    "fails without contacts": ("kinetic_energy",
-                               lambda: lambda M, J, v, e: sound_resolver(M, J, v, e) + 0.0 * np.max(np.abs(J))),
-    "NaN without contacts": ("kinetic_energy",
-                             lambda: lambda M, J, v, e: sound_resolver(M, J, v, e) if len(J) else v + np.nan),
+    "single precision": (
+        "restitution",
+        lambda: lambda *given: sound_resolver(*given).astype(np.float32).astype(float),
+    ),
+    "fails without contacts": (
+        "kinetic_energy",
+        lambda: lambda M, J, v, e: sound_resolver(M, J, v, e) + 0.0 * np.max(np.abs(J)),
+    ),
+    "NaN without contacts": (
+        "kinetic_energy",
+        lambda: lambda M, J, v, e: sound_resolver(M, J, v, e) if len(J) else v + np.nan,
+    ),
     "stale Jacobian": ("restitution", makes_stale_jacobian),
     "returns too much": ("kinetic_energy", lambda: returns_too_much),
 }
@@ -70,7 +82,8 @@ def newton(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
 
 
 def poisson(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Poisson's law 0 ≤ p_c ⟂ γ_c ≥ 0, then 0 ≤ p − (1 + e) p_c ⟂ γ⁺ ≥ 0 (Anitescu and Potra 1997)."""
+    """Poisson's law 0 ≤ p_c ⟂ γ_c ≥ 0, then 0 ≤ p − (1 + e) p_c ⟂ γ⁺ ≥ 0 (Anitescu and Potra
+    1997)."""
     return _pushing(M, J, newton(M, J, v, e), 1.0)
 
 
@@ -86,9 +99,11 @@ def _one_sweep(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
     return v
 
 
-# Friction: Moreau's law. The plastic impact obeys Coulomb's law; e scales its whole impulse by 1 + e. This is passive.
+# Friction: Moreau's law. The plastic impact obeys Coulomb's law; e scales its whole impulse by 1 +
+# e. This is passive.
 def _plastic(M: Floats, J: Floats, T: Floats, v: Floats, mu: Floats, e: float = 0.0) -> Impulses:
-    """Normal and tangential impulses (c,), (c, m) of Coulomb's law with Newton's e, by sweeps over the contacts."""
+    """Normal and tangential impulses (c,), (c, m) of Coulomb's law with Newton's e, by sweeps over
+    the contacts."""
     c, m = len(J), T.shape[1]
     if not c:
         return np.zeros(0), np.zeros((0, m))
@@ -103,13 +118,15 @@ def _struck(M: Floats, J: Floats, T: Floats, v: Floats, p: Floats, p_t: Floats) 
 
 
 def moreau(M: Floats, J: Floats, T: Floats, v: Floats, e: float, mu: Floats) -> Floats:
-    """Moreau (1988): (v⁺ + e v⁻)/(1 + e) obeys Coulomb's law with e = 0; passive for every e in [0, 1]."""
+    """Moreau (1988): (v⁺ + e v⁻)/(1 + e) obeys Coulomb's law with e = 0; passive for every e in [0,
+    1]."""
     p, p_t = _plastic(M, J, T, v, mu)
     return _struck(M, J, T, v, (1.0 + e) * p, (1.0 + e) * p_t)
 
 
 def _newton_and_coulomb(M: Floats, J: Floats, T: Floats, v: Floats, e: float, mu: Floats) -> Floats:
-    """Newton's e on the normals and Coulomb's friction: may gain energy (Kane and Levinson 1985)."""
+    """Newton's e on the normals and Coulomb's friction: may gain energy (Kane and Levinson
+    1985)."""
     return _struck(M, J, T, v, *_plastic(M, J, T, v, mu, e))
 
 
@@ -123,44 +140,72 @@ def no_friction(M: Floats, J: Floats, T: Floats, v: Floats, e: float, mu: Floats
     return moreau(M, J, T, v, e, 0.0 * mu)
 
 
-def _strikes_what_separates(M: Floats, J: Floats, T: Floats, v: Floats, e: float, mu: Floats) -> Floats:
-    """The convex relaxation (Anitescu and Tasora 2010) at e = 0: a sliding contact separates with velocity μ|v_t|."""
+def _strikes_what_separates(
+    M: Floats, J: Floats, T: Floats, v: Floats, e: float, mu: Floats
+) -> Floats:
+    """The convex relaxation (Anitescu and Tasora 2010) at e = 0: a sliding contact separates with
+    velocity μ|v_t|."""
     if not len(J):
         return v
     rows = np.concatenate([J[:, None], T], axis=1).reshape(-1, len(v))
-    problem = ImpactProblem.from_impact(M, rows, v, 0.0, mu, contact_size=1 + T.shape[1], relaxed=True)
+    problem = ImpactProblem.from_impact(
+        M, rows, v, 0.0, mu, contact_size=1 + T.shape[1], relaxed=True
+    )
     return v + (1.0 + e) * (solve(problem, "nsgs").velocity_plus - v)
 
 
 def _weak_friction(M: Floats, J: Floats, T: Floats, v: Floats, e: float, mu: Floats) -> Floats:
-    """Halves the friction of sliding contacts: this stays inside the cone and is passive, but breaks Coulomb's law."""
+    """Halves the friction of sliding contacts: this stays inside the cone and is passive, but
+    breaks Coulomb's law."""
     p, p_t = _plastic(M, J, T, v, mu)
     share = np.where(np.linalg.norm(p_t, axis=1) < mu * p * (1.0 - 1e-9), 1.0, 0.5)
     return _struck(M, J, T, v, (1.0 + e) * p, (1.0 + e) * share[:, None] * p_t)
 
 
-def friction_of_one_alone(M: Floats, J: Floats, T: Floats, v: Floats, e: float, mu: Floats) -> Floats:
+def friction_of_one_alone(
+    M: Floats, J: Floats, T: Floats, v: Floats, e: float, mu: Floats
+) -> Floats:
     """Drops friction if there is more than one contact."""
     return moreau(M, J, T, v, e, mu if len(J) == 1 else 0.0 * mu)
 
 
 # contract and name -> the law that must detect it, and the resolver
 PUSHING: dict[tuple[str, str], tuple[str, Callable[..., Any]]] = {
-    ("unilateral", "wrong sign"): ("kinetic_energy", lambda M, J, v, e: _pushing(M, J, v, -(1.0 + e))),
+    ("unilateral", "wrong sign"): (
+        "kinetic_energy",
+        lambda M, J, v, e: _pushing(M, J, v, -(1.0 + e)),
+    ),
     ("unilateral", "pulls"): ("pushing", sound_resolver),
     ("unilateral", "adhesive"): ("separating", _adhesive),
-    ("unilateral", "squared restitution"): ("restitution", lambda M, J, v, e: newton(M, J, v, e * e)),
+    ("unilateral", "squared restitution"): (
+        "restitution",
+        lambda M, J, v, e: newton(M, J, v, e * e),
+    ),
     # contacts separate too fast, but no inequality is broken and energy need not rise
-    ("unilateral", "too bouncy"): ("complementarity", lambda M, J, v, e: newton(M, J, v, float(np.sqrt(e)))),
+    ("unilateral", "too bouncy"): (
+        "complementarity",
+        lambda M, J, v, e: newton(M, J, v, float(np.sqrt(e))),
+    ),
     ("unilateral", "one sweep"): ("no_penetration", _one_sweep),
-    ("unilateral", "plastic where some separate"):
-        ("mixed_restitution", lambda M, J, v, e: newton(M, J, v, 0.0 if np.any(J @ v > 0.0) else e)),
-    ("unilateral", "slow contacts ignored"): ("restitution", lambda M, J, v, e: newton(M, J[J @ v < -0.01], v, e)),
+    ("unilateral", "plastic where some separate"): (
+        "mixed_restitution",
+        lambda M, J, v, e: newton(M, J, v, 0.0 if np.any(J @ v > 0.0) else e),
+    ),
+    ("unilateral", "slow contacts ignored"): (
+        "restitution",
+        lambda M, J, v, e: newton(M, J[J @ v < -0.01], v, e),
+    ),
     ("frictional", "Newton and Coulomb"): ("kinetic_energy", _newton_and_coulomb),
     ("frictional", "friction pushes"): ("friction_opposes", _friction_pushes),
-    ("frictional", "twice the friction"): ("cone", lambda M, J, T, v, e, mu: moreau(M, J, T, v, e, 2.0 * mu)),
+    ("frictional", "twice the friction"): (
+        "cone",
+        lambda M, J, T, v, e, mu: moreau(M, J, T, v, e, 2.0 * mu),
+    ),
     ("frictional", "no friction"): ("sticking", no_friction),
-    ("frictional", "squared restitution"): ("restitution", lambda M, J, T, v, e, mu: moreau(M, J, T, v, e * e, mu)),
+    ("frictional", "squared restitution"): (
+        "restitution",
+        lambda M, J, T, v, e, mu: moreau(M, J, T, v, e * e, mu),
+    ),
     ("frictional", "pulls"): ("cone", lambda M, J, T, v, e, mu: sound_resolver(M, J, v, e)),
     ("frictional", "strikes what separates"): ("separating", _strikes_what_separates),
     ("frictional", "weak friction"): ("maximal_dissipation", _weak_friction),

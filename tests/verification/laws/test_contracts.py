@@ -1,4 +1,5 @@
-"""Contracts of resolvers whose contacts only push: textbook ones pass, each planted bug fails by its law's name."""
+"""Contracts of resolvers whose contacts only push: textbook ones pass, each planted bug fails by
+its law's name."""
 
 from __future__ import annotations
 
@@ -28,7 +29,8 @@ def test_every_planted_bug_is_caught_by_its_law(contract: str, name: str) -> Non
 
 
 def test_a_push_along_nearly_opposed_rows_is_no_pull_and_a_pull_is_one() -> None:
-    """Least squares end 2e-7 before the first; a target opposite to every row is at its own distance."""
+    """Least squares end 2e-7 before the first; a target opposite to every row is at its own
+    distance."""
     rng = np.random.default_rng(98)
     rows = rng.normal(size=(6, 4))
     for i in range(4):
@@ -39,7 +41,9 @@ def test_a_push_along_nearly_opposed_rows_is_no_pull_and_a_pull_is_one() -> None
     assert not distance_from_cone(ImpactCase(np.eye(4), rows, -pushed, 0.0), pushed) > 1e-7
     rows = np.abs(rng.normal(size=(3, 4)))
     pulled = -rows.sum(axis=0) / np.linalg.norm(rows.sum(axis=0))
-    assert distance_from_cone(ImpactCase(np.eye(4), rows, -pulled, 0.0), pulled) == pytest.approx(1.0)
+    assert distance_from_cone(ImpactCase(np.eye(4), rows, -pulled, 0.0), pulled) == pytest.approx(
+        1.0
+    )
 
 
 def test_a_contact_that_is_left_approaching_slower_is_driven_in() -> None:
@@ -49,22 +53,31 @@ def test_a_contact_that_is_left_approaching_slower_is_driven_in() -> None:
 
 
 def test_the_engines_friction_keeps_what_holds_for_equalities() -> None:
-    """`resolve_frictional_impact` takes every normal as an equality, so it may pull and holds what separates.
+    """`resolve_frictional_impact` takes every normal as an equality, so it may pull and holds what
+    separates.
 
-    A contact that pushes only because of the friction at another one slides without friction: 1 of 78 impacts.
+    A contact that pushes only because of the friction at another one slides without friction: 1 of
+    78 impacts.
     """
     broken = ("cone", "separating", "maximal_dissipation")
     kept = [name for name in CONTRACTS["frictional"].laws if name not in broken]  # exact_energy too
-    assert check_passivity(resolve_frictional_impact, contract="frictional", laws=kept, impacts=100).passed
-    report = check_passivity(resolve_frictional_impact, contract="frictional", laws=broken, impacts=100, search=0)
+    assert check_passivity(
+        resolve_frictional_impact, contract="frictional", laws=kept, impacts=100
+    ).passed
+    report = check_passivity(
+        resolve_frictional_impact, contract="frictional", laws=broken, impacts=100, search=0
+    )
     assert set(report.broken_laws) == set(broken)
 
 
 def test_gains_in_real_arithmetic_are_graded() -> None:
-    """The engine gains in no bit; a sound resolver by rounding; 1e-4 too much of the impulse is severe."""
+    """The engine gains in no bit; a sound resolver by rounding; 1e-4 too much of the impulse is
+    severe."""
     exact = {"laws": ["exact_energy"], "impacts": 100, "search": 0}
     assert check_passivity(resolve_impact, **exact).passed
-    assert check_passivity(partial(resolve_impact, method="poisson"), contract="unilateral", **exact).passed
+    assert check_passivity(
+        partial(resolve_impact, method="poisson"), contract="unilateral", **exact
+    ).passed
     rounding = check_passivity(sound_resolver, **exact).verdict("exact_energy")
     assert rounding.failures > 0 and rounding.severe == 0
     grades = f"impacts break it (0 by more than rounding, {rounding.failures} within it)"
@@ -73,14 +86,23 @@ def test_gains_in_real_arithmetic_are_graded() -> None:
     assert 0 < graded.severe <= graded.failures
 
 
-@pytest.mark.parametrize(("options", "message"), [
-    ({"impacts": 0}, "impacts = 0: expected a whole number, 1 or more"),
-    ({"contract": "one-sided"}, "expected one of equality, unilateral, frictional"),
-    ({"laws": ["pushin"], "contract": "unilateral"}, "did you mean pushing?"),
-    ({"laws": []}, "at least one of kinetic_energy"), ({"laws": 1}, "laws = 1: expected names of laws"),
-    ({"contract": "frictional", "unequal_restitution": True}, "False with contract 'frictional'"),
-    ({"seed": -1}, "seed = -1: expected a whole number"), ({"seed": 1.5}, "seed = 1.5"), ({"seed": "3"}, "seed = "),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"impacts": 0}, "impacts = 0: expected a whole number, 1 or more"),
+        ({"contract": "one-sided"}, "expected one of equality, unilateral, frictional"),
+        ({"laws": ["pushin"], "contract": "unilateral"}, "did you mean pushing?"),
+        ({"laws": []}, "at least one of kinetic_energy"),
+        ({"laws": 1}, "laws = 1: expected names of laws"),
+        (
+            {"contract": "frictional", "unequal_restitution": True},
+            "False with contract 'frictional'",
+        ),
+        ({"seed": -1}, "seed = -1: expected a whole number"),
+        ({"seed": 1.5}, "seed = 1.5"),
+        ({"seed": "3"}, "seed = "),
+    ],
+)
 def test_what_would_judge_nothing_is_refused(options: dict[str, object], message: str) -> None:
     with pytest.raises(ArgumentError) as caught:
         check_passivity(newton, **options)
@@ -88,21 +110,41 @@ def test_what_would_judge_nothing_is_refused(options: dict[str, object], message
 
 
 def test_a_broken_report_raises_with_the_matrices_and_what_came_back() -> None:
-    report = check_passivity(sound_resolver, contract="unilateral", laws=["pushing"], impacts=30, search=30)
+    report = check_passivity(
+        sound_resolver, contract="unilateral", laws=["pushing"], impacts=30, search=30
+    )
     with pytest.raises(AssertionError) as caught:
         report.raise_if_broken()
     text = str(caught.value)
-    for line in ("  M = [[", "  J = [[", "  v = [", "  e = ", "  returned = [", "def test_pushing():"):
+    for line in (
+        "  M = [[",
+        "  J = [[",
+        "  v = [",
+        "  e = ",
+        "  returned = [",
+        "def test_pushing():",
+    ):
         assert line in text
     assert str(report) == repr(report) == text and isinstance(report, str)
-    report = check_passivity(newton, contract="unilateral", laws=["pushing", "kinetic_energy"], impacts=3)
+    report = check_passivity(
+        newton, contract="unilateral", laws=["pushing", "kinetic_energy"], impacts=3
+    )
     report.raise_if_broken()
-    assert [verdict.law for verdict in report.verdicts] == ["kinetic_energy", "pushing"]  # in the contract's order
+    assert [verdict.law for verdict in report.verdicts] == [
+        "kinetic_energy",
+        "pushing",
+    ]  # in the contract's order
     assert pickle.loads(pickle.dumps(report)) == report  # travels between processes
 
 
 def test_a_counterexample_with_friction_shrinks_to_one_contact() -> None:
-    report = check_passivity(no_friction, contract="frictional", laws=["sticking"], impacts=60, search=60)
+    report = check_passivity(
+        no_friction, contract="frictional", laws=["sticking"], impacts=60, search=60
+    )
     case = report.counterexample
-    assert case.contacts == 1 and case.tangents.shape == (1, 1, case.coordinates) and case.coordinates == 2
+    assert (
+        case.contacts == 1
+        and case.tangents.shape == (1, 1, case.coordinates)
+        and case.coordinates == 2
+    )
     assert "  T = [[[" in report and "  μ = [" in report

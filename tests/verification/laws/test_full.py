@@ -1,4 +1,5 @@
-"""The long verification: the laws of an impact share its one call; the dearer ones see their fair part of all."""
+"""The long verification: the laws of an impact share its one call; the dearer ones see their fair
+part of all."""
 
 from __future__ import annotations
 
@@ -43,15 +44,22 @@ def test_every_law_has_its_part_of_the_impacts(part: str, laws: dict[str, object
 
 @pytest.mark.parametrize("index", [41452, 57210])
 def test_a_grazing_cradle_may_lose_an_impulse_below_rounding_in_another_frame(index: int) -> None:
-    """Found by the long run: the clamp cuts an impulse of 1e-8 |u| that moves less energy than rounding does."""
+    """Found by the long run: the clamp cuts an impulse of 1e-8 |u| that moves less energy than
+    rounding does."""
     engine = study.subject_of(resolve_impact)
     case = study.drawn(study.UNEQUAL, index, engine)
     law = UNEQUAL_LAWS["unequal_momentum"].check
     residual = law(case, resolve_impact, FACTORED)
-    assert residual is not None and residual.passed and 2.0 * np.sqrt(FACTORED.energy_gain(case)) < 1e-5
+    assert (
+        residual is not None
+        and residual.passed
+        and 2.0 * np.sqrt(FACTORED.energy_gain(case)) < 1e-5
+    )
 
     def per_body(M: Floats, J: Floats, v: Floats, e: Floats) -> object:
-        return resolve_impact(M, np.vstack([np.maximum(J, 0.0), np.minimum(J, 0.0)]), v, np.concatenate([e, e]))
+        return resolve_impact(
+            M, np.vstack([np.maximum(J, 0.0), np.minimum(J, 0.0)]), v, np.concatenate([e, e])
+        )
 
     broken = law(case, per_body, FACTORED)
     assert broken is not None and not broken.passed
@@ -62,7 +70,10 @@ def test_the_plan_covers_every_part_once() -> None:
     assert {batch.part for batch in batches} == set(study.PARTS)
     impacts = sorted((batch.first, batch.count) for batch in batches if batch.part == study.IMPACTS)
     assert sum(count for _, count in impacts) == 1_000_000
-    assert all(first + count == following for (first, count), (following, _) in zip(impacts, impacts[1:], strict=False))
+    assert all(
+        first + count == following
+        for (first, count), (following, _) in zip(impacts, impacts[1:], strict=False)
+    )
     assert sum(batch.count for batch in batches if batch.part == study.TRAJECTORIES) == 5000
 
 

@@ -1,4 +1,5 @@
-"""The kit passes sound resolvers, finds what is wrong in others by itself, and says it so that one can paste it."""
+"""The kit passes sound resolvers, finds what is wrong in others by itself, and says it so that one
+can paste it."""
 
 from __future__ import annotations
 
@@ -23,19 +24,27 @@ from verification.laws.planted import each_contact_its_own_restitution, wrong_si
 from verification.laws.resolver import Resolver
 
 
-@pytest.mark.parametrize(("law", "make"), [*((law, bug.make) for law, bug in PLANTED_BUGS.items()), *BUGS.values()],
-                         ids=[*PLANTED_BUGS, *BUGS])
+@pytest.mark.parametrize(
+    ("law", "make"),
+    [*((law, bug.make) for law, bug in PLANTED_BUGS.items()), *BUGS.values()],
+    ids=[*PLANTED_BUGS, *BUGS],
+)
 def test_every_planted_bug_is_caught_by_its_law(law: str, make: Callable[[], Resolver]) -> None:
-    report = check_passivity(make(), impacts=60, search=0, laws=None if law == "arguments" else [law])
+    report = check_passivity(
+        make(), impacts=60, search=0, laws=None if law == "arguments" else [law]
+    )
     assert report.broken_laws == (law,), report
 
 
 def test_a_gain_that_no_blas_touches_is_reported_as_exact_rationals_have_it() -> None:
-    """(1 + e)(1 + δ) times the projection P u changes the energy by its factor f (f − 2) of |P u|² / |u|²."""
+    """(1 + e)(1 + δ) times the projection P u changes the energy by its factor f (f − 2) of |P u|²
+    / |u|²."""
     report = check_passivity(returns_too_much, impacts=30, search=60)
     verdict, case = report.verdict("kinetic_energy"), report.counterexample
     most = float(2 * TOO_MUCH * (2 * TOO_MUCH - 2))
-    assert verdict.largest == pytest.approx(most, rel=1e-12)  # e = 1 and rows that see all of the motion: rounded once
+    assert verdict.largest == pytest.approx(
+        most, rel=1e-12
+    )  # e = 1 and rows that see all of the motion: rounded once
     assert report.broken_laws[0] == report.counterexample_law == "kinetic_energy"
     assert (case.coordinates, case.contacts, case.restitution) == (1, 1, 1.0)
     found = verdict.worst_case
@@ -46,7 +55,8 @@ def test_a_gain_that_no_blas_touches_is_reported_as_exact_rationals_have_it() ->
 
 @pytest.mark.parametrize("index", range(3))
 def test_shrinking_ends_and_leaves_nothing_to_take(index: int) -> None:
-    """The resolver gains in exact rationals, so neither its answers nor the verdicts depend on a BLAS."""
+    """The resolver gains in exact rationals, so neither its answers nor the verdicts depend on a
+    BLAS."""
 
     def gains(case: ImpactCase) -> bool:
         after = returns_too_much(*case.arrays, case.restitution)
@@ -57,9 +67,14 @@ def test_shrinking_ends_and_leaves_nothing_to_take(index: int) -> None:
     assert all(np.array_equal(x, np.round(x, 1)) for x in (smallest.mass_matrix, smallest.velocity))
 
 
-def test_the_smallest_impact_drawn_is_the_counterexample_where_shrinking_does_not_reach_it() -> None:
-    def resolver(mass_matrix: Floats, contact_jacobian: Floats, velocity: Floats, restitution: float) -> Floats:
-        """It gains energy with two coordinates, and more with seven; with the sizes between it does not."""
+def test_the_smallest_impact_drawn_is_the_counterexample_where_shrinking_does_not_reach_it() -> (
+    None
+):
+    def resolver(
+        mass_matrix: Floats, contact_jacobian: Floats, velocity: Floats, restitution: float
+    ) -> Floats:
+        """It gains energy with two coordinates, and more with seven; with the sizes between it does
+        not."""
         return velocity * {2: 2.0, 7: 9.0}.get(len(velocity), 0.0)
 
     report = check_passivity(resolver, laws=["kinetic_energy"], impacts=100, search=0)
@@ -68,23 +83,35 @@ def test_the_smallest_impact_drawn_is_the_counterexample_where_shrinking_does_no
     assert largest is not None and largest.coordinates == 7
 
 
-@pytest.mark.parametrize(("answer", "complaint"), [
-    (lambda v: v[:-1], "shape"),
-    (lambda v: v * np.nan, "not finite"),
-    (lambda v: np.full(len(v), np.longdouble("1e400")), "not finite"),
-    (lambda v: "fast", "returned"),
-    (lambda v: [[1.0], [1.0, 2.0]], "returned list, which is no array"),
-    (lambda v: 1 / 0, "ZeroDivisionError"),
-])  # fmt: skip
-def test_a_resolver_that_gives_nothing_usable_fails_with_its_complaint(answer: Any, complaint: str) -> None:
+@pytest.mark.parametrize(
+    ("answer", "complaint"),
+    [
+        (lambda v: v[:-1], "shape"),
+        (lambda v: v * np.nan, "not finite"),
+        (lambda v: np.full(len(v), np.longdouble("1e400")), "not finite"),
+        (lambda v: "fast", "returned"),
+        (lambda v: [[1.0], [1.0, 2.0]], "returned list, which is no array"),
+        (lambda v: 1 / 0, "ZeroDivisionError"),
+    ],
+)
+def test_a_resolver_that_gives_nothing_usable_fails_with_its_complaint(
+    answer: Any, complaint: str
+) -> None:
     report = check_passivity(lambda M, J, v, e: answer(v), impacts=5, search=0)
-    assert not report.passed and complaint in report.verdict("kinetic_energy").fault and complaint in report
+    assert (
+        not report.passed
+        and complaint in report.verdict("kinetic_energy").fault
+        and complaint in report
+    )
 
 
 def test_unequal_restitution_is_opt_in() -> None:
-    """Newton's equalities with a restitution per row: sound while they are equal, and a gain of energy when not."""
+    """Newton's equalities with a restitution per row: sound while they are equal, and a gain of
+    energy when not."""
     assert check_passivity(each_contact_its_own_restitution, impacts=30).passed
-    report = check_passivity(each_contact_its_own_restitution, impacts=30, search=60, unequal_restitution=True)
+    report = check_passivity(
+        each_contact_its_own_restitution, impacts=30, search=60, unequal_restitution=True
+    )
     assert report.broken_laws == ("unequal_kinetic_energy",)
     assert report.verdict("unequal_kinetic_energy").largest > 0.1
     scope: dict[str, object] = {}
@@ -103,23 +130,38 @@ def test_a_slow_resolver_ends_unfinished_and_not_passed() -> None:
     assert "NOT FINISHED" in str(report) and "too slow" in str(report)
 
 
-@pytest.mark.parametrize(("law", "resolver"), [
-    ("kinetic_energy", wrong_sign), ("momentum", PLANTED_BUGS["momentum"].make()), ("impulse_range", reversed_velocity),
-    ("restitution", partial(resolve_impact, budget=0)),
-])  # fmt: skip
-def test_every_pasted_test_fails_on_its_resolver_and_passes_on_a_sound_one(law: str, resolver: Resolver) -> None:
+@pytest.mark.parametrize(
+    ("law", "resolver"),
+    [
+        ("kinetic_energy", wrong_sign),
+        ("momentum", PLANTED_BUGS["momentum"].make()),
+        ("impulse_range", reversed_velocity),
+        ("restitution", partial(resolve_impact, budget=0)),
+    ],
+)
+def test_every_pasted_test_fails_on_its_resolver_and_passes_on_a_sound_one(
+    law: str, resolver: Resolver
+) -> None:
     report = check_passivity(resolver, impacts=30, search=20, laws=[law])
-    for text in (report.counterexample_test, as_test(report.verdict(law).worst_case, law, resolver=resolver)):
+    for text in (
+        report.counterexample_test,
+        as_test(report.verdict(law).worst_case, law, resolver=resolver),
+    ):
         name = text.split("def ")[1].split("(")[0]
         with pytest.raises(AssertionError):
             exec(f"{text}\n\n{name}()", {})
-    exec(as_test(report.verdict(law).worst_case, law, resolver=sound_resolver) + f"\n\ntest_{law}()", {})
+    exec(
+        as_test(report.verdict(law).worst_case, law, resolver=sound_resolver) + f"\n\ntest_{law}()",
+        {},
+    )
 
 
 def test_gains_beyond_sixty_decades_are_judged() -> None:
     """The kit itself raised on them, and called a right answer with an entry of 1e-70 wrong."""
     for power in (100, 300):
-        report = check_passivity(lambda M, J, v, e, power=power: v * 10.0**power, impacts=3, search=20)
+        report = check_passivity(
+            lambda M, J, v, e, power=power: v * 10.0**power, impacts=3, search=20
+        )
         assert not report.passed and "the law itself raised" not in report
 
     def tiny(M: Any, J: Any, v: Any, e: Any) -> Any:
@@ -131,7 +173,9 @@ def test_gains_beyond_sixty_decades_are_judged() -> None:
 
 def test_the_exact_law_sees_gains_that_no_double_can_hold() -> None:
     """Relative to KE⁻ they are above 1.8e308, which raised, or below 5e-324, which passed."""
-    report = check_passivity(lambda M, J, v, e: 1e300 * v, impacts=3, laws=["exact_energy"], search=20)
+    report = check_passivity(
+        lambda M, J, v, e: 1e300 * v, impacts=3, laws=["exact_energy"], search=20
+    )
     assert not report.passed and "the law itself raised" not in report
     case = ImpactCase(np.eye(2), np.zeros((0, 2)), np.array([1.0, 0.0]), 0.5, "x")
     exact = EXACT_LAWS["exact_energy"].check

@@ -1,4 +1,5 @@
-"""Every law on impacts that hypothesis draws: our resolver against the bounds it proves, up to κ(M) = 1e14."""
+"""Every law on impacts that hypothesis draws: our resolver against the bounds it proves, up to κ(M)
+= 1e14."""
 
 from __future__ import annotations
 
@@ -35,18 +36,28 @@ def test_an_unknown_residual_never_passes() -> None:
     assert not LawResidual("any", 1e-30, 0.0).passed
     assert LawResidual("any", 0.0, 0.0).passed and LawResidual("any", -1.0, 1e-9).passed
     count = LawCount("any")
-    assert [count.add(LawResidual("", value, 1.0)) for value in (0.5, np.nan, 2.0)] == [True, False, False]
+    assert [count.add(LawResidual("", value, 1.0)) for value in (0.5, np.nan, 2.0)] == [
+        True,
+        False,
+        False,
+    ]
     assert (count.checked, count.failures) == (3, 2) and np.isnan(count.worst.value)
     assert ((count + count).checked, (count + count).failures) == (6, 4)  # of two workers
 
 
 def test_a_rebound_too_weak_and_one_too_strong_are_the_same_residual() -> None:
     case = ImpactCase(np.eye(1), np.eye(1), np.array([-1.0]), 0.5)
-    assert [case.unmet_restitution(np.array([after])) for after in (0.25, 0.5, 0.75)] == [0.25, 0.0, 0.25]
+    assert [case.unmet_restitution(np.array([after])) for after in (0.25, 0.5, 0.75)] == [
+        0.25,
+        0.0,
+        0.25,
+    ]
 
 
 def test_momentum_that_appears_is_found_though_it_is_the_same_in_every_frame() -> None:
-    case = ImpactCase(np.eye(2), np.array([[1.0, -1.0]]), np.array([-1.0, 1.0]), 0.5, translations=np.ones((1, 2)))
+    case = ImpactCase(
+        np.eye(2), np.array([[1.0, -1.0]]), np.array([-1.0, 1.0]), 0.5, translations=np.ones((1, 2))
+    )
     residual = LAWS["momentum"].check(case, lambda M, J, v, e: v + (1.0, 0.0), KIT)
     assert residual is not None and not residual.passed
 

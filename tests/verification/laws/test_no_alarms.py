@@ -1,4 +1,5 @@
-"""A sound resolver passes the kit at every size and seed: a hundred seeds in `make deep`, known hard ones always."""
+"""A sound resolver passes the kit at every size and seed: a hundred seeds in `make deep`, known
+hard ones always."""
 
 from __future__ import annotations
 
@@ -19,19 +20,29 @@ from verification.laws import LAWS, sound_resolver
 from verification.laws.bounds import KIT
 from verification.laws.contracts import distance_from_cone
 
-SEEDS, IMPACTS = (100, 5000) if os.environ.get("IAPB_HYPOTHESIS_PROFILE") == "deep" else (1, 100)  # hours, or seconds
+SEEDS, IMPACTS = (
+    (100, 5000) if os.environ.get("IAPB_HYPOTHESIS_PROFILE") == "deep" else (1, 100)
+)  # hours, or seconds
 
 
 def whole_numbers(M: Any, J: Any, v: Any, e: Any) -> Any:
-    """A list of Python integers where the answer is whole, such as at e = −1: as good as an array."""
+    """A list of Python integers where the answer is whole, such as at e = −1: as good as an
+    array."""
     v_plus = sound_resolver(M, J, v, e)
-    return [int(x) if x == int(x) else float(x) for x in v_plus] if np.all(v_plus == np.round(v_plus)) else v_plus
+    return (
+        [int(x) if x == int(x) else float(x) for x in v_plus]
+        if np.all(v_plus == np.round(v_plus))
+        else v_plus
+    )
 
 
 SOUND: dict[str, tuple[str, Callable[..., Any]]] = {
-    "iapb": ("equality", resolve_impact), "svd": ("equality", sound_resolver),
+    "iapb": ("equality", resolve_impact),
+    "svd": ("equality", sound_resolver),
     "whole numbers": ("equality", whole_numbers),
-    "newton": ("unilateral", newton), "poisson": ("unilateral", poisson), "moreau": ("frictional", moreau),
+    "newton": ("unilateral", newton),
+    "poisson": ("unilateral", poisson),
+    "moreau": ("frictional", moreau),
     "iapb poisson": ("unilateral", partial(resolve_impact, method="poisson")),
 }
 
@@ -40,14 +51,26 @@ SOUND: dict[str, tuple[str, Callable[..., Any]]] = {
 @pytest.mark.parametrize("name", SOUND)
 def test_a_sound_resolver_passes_at_every_seed(name: str, seed: int) -> None:
     contract, resolver = SOUND[name]
-    report = check_passivity(resolver, contract=contract, impacts=IMPACTS, seed=seed, search=0, patience=np.inf,
-                             unequal_restitution=name == "iapb")
+    report = check_passivity(
+        resolver,
+        contract=contract,
+        impacts=IMPACTS,
+        seed=seed,
+        search=0,
+        patience=np.inf,
+        unequal_restitution=name == "iapb",
+    )
     assert report.passed and all(verdict.checked > 0 for verdict in report.verdicts), report
-    assert report.counterexample is None and report.counterexample_test == "" and report.worst.worst.ratio <= 1.0
+    assert (
+        report.counterexample is None
+        and report.counterexample_test == ""
+        and report.worst.worst.ratio <= 1.0
+    )
 
 
 def test_many_dependent_rows_may_be_reduced_to_any_of_them() -> None:
-    """Seed 22, 409 rows of rank 19: rows chosen for their speed, all rounding here, are far from the best ones."""
+    """Seed 22, 409 rows of rank 19: rows chosen for their speed, all rounding here, are far from
+    the best ones."""
     rng = np.random.default_rng(22)
     case = [draw_wide_case(rng, number) for number in range(296)][-1]
     assert (case.coordinates, case.contacts, len(case.row_space)) == (26, 409, 19)
@@ -56,14 +79,17 @@ def test_many_dependent_rows_may_be_reduced_to_any_of_them() -> None:
 
 
 def test_the_distance_from_the_cone_of_two_sliding_contacts_on_dependent_rows_is_zero() -> None:
-    """Two contacts of a body in space have five independent rows; the search by rays alone ends above 1e-7 in some."""
+    """Two contacts of a body in space have five independent rows; the search by rays alone ends
+    above 1e-7 in some."""
     rng = np.random.default_rng(3)
     for number in range(2, 400, 4):
         case = draw_frictional_case(rng, number)
         assert case.tangents is not None and case.friction is not None
         normal = rng.uniform(0.1, 1.0, case.contacts)
         angle = rng.uniform(0.0, 2.0 * np.pi, case.contacts)
-        sliding = (case.friction * normal)[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+        sliding = (case.friction * normal)[:, None] * np.column_stack(
+            [np.cos(angle), np.sin(angle)]
+        )
         push = np.concatenate([normal, sliding.ravel()])
         target = push @ case.with_tangents.rows
         target, unit = target / np.linalg.norm(target), replace(case, restitution=0.0)

@@ -12,7 +12,9 @@ from verification.laws.trajectories import TRAJECTORY_LAWS, Trajectory, judge_ru
 STEPS = 200
 
 
-@pytest.fixture(scope="module", params=[draw_scene, draw_spatial_scene], ids=["in the plane", "in space"])
+@pytest.fixture(
+    scope="module", params=[draw_scene, draw_spatial_scene], ids=["in the plane", "in space"]
+)
 def drawn(request: pytest.FixtureRequest) -> list[SceneCase]:
     rng = np.random.default_rng(7)
     return [request.param(rng, STEPS) for _ in range(60)]

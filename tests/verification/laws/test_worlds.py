@@ -1,4 +1,5 @@
-"""Worlds and engines on random scenes: each planted fault breaks its own law, and a wrong name is refused."""
+"""Worlds and engines on random scenes: each planted fault breaks its own law, and a wrong name is
+refused."""
 
 from __future__ import annotations
 
@@ -68,7 +69,11 @@ def broken(engine: str) -> set[str]:
 
 @pytest.mark.parametrize(
     ("engine", "breaks", "keeps"),
-    [("Flight", "overlap", "velocity"), ("Backwards", "velocity", "finite"), ("Rising", "energy", "velocity")],
+    [
+        ("Flight", "overlap", "velocity"),
+        ("Backwards", "velocity", "finite"),
+        ("Rising", "energy", "velocity"),
+    ],
 )
 def test_each_fault_breaks_its_law(engine: str, breaks: str, keeps: str) -> None:
     found = broken(engine)
@@ -82,10 +87,15 @@ def test_mujoco_keeps_the_laws() -> None:
     assert not any(count.failures for count in counts)
 
 
-@pytest.mark.parametrize(("name", "said"), [
-    ("no_such:engine", "can be imported"), ("json:dumps", "an engine: an object with name"),
-    (f"{HERE}:Flit", "did you mean Flight"), ("mujocco", "did you mean mujoco"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("no_such:engine", "can be imported"),
+        ("json:dumps", "an engine: an object with name"),
+        (f"{HERE}:Flit", "did you mean Flight"),
+        ("mujocco", "did you mean mujoco"),
+    ],
+)
 def test_a_wrong_name_is_refused(name: str, said: str) -> None:
     with pytest.raises(ArgumentError, match=said):
         find_world(name)

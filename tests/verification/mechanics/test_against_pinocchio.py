@@ -1,4 +1,5 @@
-"""The comparison with Pinocchio and the references is complete, and notices a wrong mass, reading, gap or e."""
+"""The comparison with Pinocchio and the references is complete, and notices a wrong mass, reading,
+gap or e."""
 
 from __future__ import annotations
 
@@ -28,7 +29,12 @@ ARM = """<robot name="arm">
 @pytest.fixture(autouse=True)
 def few(monkeypatch, tmp_path):
     """Few states and texts; one robot in the folder."""
-    for name, value in (("STATES", 2), ("TREES", {"quick": 1}), ("WRITTEN", {"quick": 1}), ("ROBOTS", tmp_path)):
+    for name, value in (
+        ("STATES", 2),
+        ("TREES", {"quick": 1}),
+        ("WRITTEN", {"quick": 1}),
+        ("ROBOTS", tmp_path),
+    ):
         monkeypatch.setattr(study, name, value)
     (tmp_path / "arm.urdf").write_text(ARM)
     return tmp_path
@@ -59,13 +65,17 @@ def test_robots_that_are_not_there_are_said_to_be_not_there(monkeypatch, tmp_pat
 def test_a_wrong_mass_is_noticed_in_every_tree(monkeypatch):
     def heavier(mechanism):
         body = mechanism.bodies[0]
-        return original(type(mechanism)([replace(body, mass=1.001 * body.mass), *mechanism.bodies[1:]]))
+        return original(
+            type(mechanism)([replace(body, mass=1.001 * body.mass), *mechanism.bodies[1:]])
+        )
 
     original = study.model_of
     monkeypatch.setattr(study, "model_of", heavier)
     chosen = [case for case in cases("joint kinds") if "revolute" in case.label]
     table = study.AGAINST_PINOCCHIO.table(Study(), chosen)
-    assert set(table.holds) == {False} and REFUTED in {part.verdict for part in study.agreement(table)}
+    assert set(table.holds) == {False} and REFUTED in {
+        part.verdict for part in study.agreement(table)
+    }
 
 
 def test_a_reading_that_turns_inertias_wrongly_is_noticed(monkeypatch, tmp_path):
@@ -101,4 +111,7 @@ def test_a_contact_that_is_off_is_noticed(monkeypatch):
         return (found := find(*given))._replace(gap=found.gap + 1e-10)
 
     monkeypatch.setattr(study, "find_contacts", shifted)
-    assert study.scene_difference(load_scene(find_scene("peg_corner")), configurations=3)["gap [m]"] >= 0.99e-10
+    assert (
+        study.scene_difference(load_scene(find_scene("peg_corner")), configurations=3)["gap [m]"]
+        >= 0.99e-10
+    )

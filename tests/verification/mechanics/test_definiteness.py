@@ -11,7 +11,9 @@ from verification.check import Study
 from verification.mechanics import definiteness as study
 
 
-def test_mass_matrices_are_positive_definite_and_one_that_is_not_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_mass_matrices_are_positive_definite_and_one_that_is_not_fails(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     original = Mechanism.mass_matrix
 
     def broken(self: Mechanism, q: Floats) -> Floats:

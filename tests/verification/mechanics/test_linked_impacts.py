@@ -28,7 +28,9 @@ def test_relative_rows_keep_energy_and_momentum_and_per_body_rows_lose_momentum(
 
 
 @pytest.mark.parametrize(("part", "share"), [(0, 1.001), (1, 0.0)])
-def test_outcomes_that_contradict_a_sentence_refute_it(monkeypatch, part: int, share: float) -> None:
+def test_outcomes_that_contradict_a_sentence_refute_it(
+    monkeypatch, part: int, share: float
+) -> None:
     """Relative rows that lose momentum, and per-body rows that keep it."""
 
     def spoilt(balls, outcomes=study.outcomes):
@@ -38,7 +40,9 @@ def test_outcomes_that_contradict_a_sentence_refute_it(monkeypatch, part: int, s
             yield treatment, words, after
 
     monkeypatch.setattr(study, "outcomes", spoilt)
-    assert study.LINKED_IMPACTS.sentences(study.LINKED_IMPACTS.table(Study()))[part].verdict == REFUTED
+    assert (
+        study.LINKED_IMPACTS.sentences(study.LINKED_IMPACTS.table(Study()))[part].verdict == REFUTED
+    )
 
 
 @pytest.mark.parametrize("n", range(2, 8))
@@ -62,5 +66,7 @@ def test_bernoulli_struck_at_once_is_symmetric_and_in_turn_is_not() -> None:
     expected = [[-0.2, 0.0], [speed * cos, speed * sin], [speed * cos, -speed * sin]]
     np.testing.assert_allclose(at_once, expected, atol=study.CONSERVED)
     first, second = (chosen(found, "event-driven", f"{k}, then") for k in (0, 1))
-    assert abs(first[0, 1]) > 0.1  # the striker is thrown aside, to the side of the ball struck second
+    assert (
+        abs(first[0, 1]) > 0.1
+    )  # the striker is thrown aside, to the side of the ball struck second
     np.testing.assert_allclose(first[[0, 2, 1]] * [1.0, -1.0], second, atol=study.CONSERVED)

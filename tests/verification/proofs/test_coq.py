@@ -1,4 +1,5 @@
-"""checked.json holds what Coq accepted for these sources; the extracted checker judges as our judge does."""
+"""checked.json holds what Coq accepted for these sources; the extracted checker judges as our judge
+does."""
 
 from __future__ import annotations
 
@@ -29,7 +30,8 @@ def make(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 def development(folder: Path, **sources: str) -> Path:
-    """Return a folder with the Makefile, checked.py and these sources, instead of those of the project."""
+    """Return a folder with the Makefile, checked.py and these sources, instead of those of the
+    project."""
     for name in ("Makefile", "checked.py"):
         shutil.copy(checked.FOLDER / name, folder)
     for name, source in sources.items():
@@ -50,7 +52,8 @@ def checker(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def near_the_border(
     n: int, d: int, rng: np.random.Generator, decades: float
 ) -> tuple[np.ndarray, ...]:
-    """M asymmetric in the last bit, v and w = ±v with one unit in the last place planted in one entry: gain or loss."""
+    """M asymmetric in the last bit, v and w = ±v with one unit in the last place planted in one
+    entry: gain or loss."""
     root = rng.normal(size=(n, d, d))
     mass = np.nextafter(
         root @ root.transpose(0, 2, 1), np.where(rng.random((n, d, d)) < 0.5, np.inf, -np.inf)
@@ -88,19 +91,43 @@ def test_the_extracted_checker_judges_as_the_exact_judge_does(
 
 
 IMPACT = f"{EXPORT_HEAD}\n1 1 0 1 0 1 0\n"
-WRAPPED = ("0x7fffffffffffffff", "0u9223372036854775807", "0b1", "0o7", "1_0", "+1", "-", "--1", "1\r",
-           "4611686018427387904", "-4611686018427387904")  # fmt: skip
+WRAPPED = (
+    "0x7fffffffffffffff",
+    "0u9223372036854775807",
+    "0b1",
+    "0o7",
+    "1_0",
+    "+1",
+    "-",
+    "--1",
+    "1\r",
+    "4611686018427387904",
+    "-4611686018427387904",
+)
 
 
 @needs_ocaml
-@pytest.mark.parametrize(("text", "said"), [
-    ("", "line 1: the file is cut"), ("1 1 0 1 0 1 0\n", "first line"),
-    (f"{EXPORT_HEAD}\n1 1 0 1 0 1\n", "line 2: too few"), (f"{EXPORT_HEAD}\n", "line 2: the file is cut"),
-    (IMPACT, "line 3: the file is cut"), (f"{IMPACT}end 2\n", '"end 2", but 1 impacts'),
-    (f"{EXPORT_HEAD}\nend\n", '"end", but 0'), (f"{EXPORT_HEAD}\nend 0\n1 1 0 1 0 2 0\n", "line 3: a line after"),
-    (f"{EXPORT_HEAD}\n1 1 0 1 0 1 0 5\n", "too many"), (f"{EXPORT_HEAD}\n1 0.5 0 1 0 1 0\n", "whole number"),
-    (f"{EXPORT_HEAD}\n\n", "empty line"), (f"{EXPORT_HEAD}\n0\n", "below 1"),
-    *((f"{EXPORT_HEAD}\n1 1 0 1 0 {word} 0\nend 1\n", "line 2: no whole number") for word in WRAPPED)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "line 1: the file is cut"),
+        ("1 1 0 1 0 1 0\n", "first line"),
+        (f"{EXPORT_HEAD}\n1 1 0 1 0 1\n", "line 2: too few"),
+        (f"{EXPORT_HEAD}\n", "line 2: the file is cut"),
+        (IMPACT, "line 3: the file is cut"),
+        (f"{IMPACT}end 2\n", '"end 2", but 1 impacts'),
+        (f"{EXPORT_HEAD}\nend\n", '"end", but 0'),
+        (f"{EXPORT_HEAD}\nend 0\n1 1 0 1 0 2 0\n", "line 3: a line after"),
+        (f"{EXPORT_HEAD}\n1 1 0 1 0 1 0 5\n", "too many"),
+        (f"{EXPORT_HEAD}\n1 0.5 0 1 0 1 0\n", "whole number"),
+        (f"{EXPORT_HEAD}\n\n", "empty line"),
+        (f"{EXPORT_HEAD}\n0\n", "below 1"),
+        *(
+            (f"{EXPORT_HEAD}\n1 1 0 1 0 {word} 0\nend 1\n", "line 2: no whole number")
+            for word in WRAPPED
+        ),
+    ],
+)
 def test_what_is_no_file_of_impacts_is_refused(
     checker: Path, tmp_path: Path, text: str, said: str
 ) -> None:

@@ -1,4 +1,5 @@
-"""Both kernels refuse what does not follow: corrupted statements, corrupted certificates, facts nobody established."""
+"""Both kernels refuse what does not follow: corrupted statements, corrupted certificates, facts
+nobody established."""
 
 import re
 from dataclasses import replace
@@ -15,8 +16,15 @@ from verification.proofs.steps import Known, Refused, Step, infer, prove
 from verification.proofs.steps import check as check_step
 from verification.proofs.words import Expression, Fact, Reader, letter, product
 
-NAMES = {"A": letter("A", "m", "n"), "B": letter("B", "n", "m"), "C": letter("C", "n", "n"), "x": letter("x", "n", "1"),
-         "y": letter("y", "n", "1"), "s": letter("s"), "q": letter("q")}  # fmt: skip
+NAMES = {
+    "A": letter("A", "m", "n"),
+    "B": letter("B", "n", "m"),
+    "C": letter("C", "n", "n"),
+    "x": letter("x", "n", "1"),
+    "y": letter("y", "n", "1"),
+    "s": letter("s"),
+    "q": letter("q"),
+}
 READER = Reader(NAMES)
 FACT, VALUE = READER.fact, READER.expression
 DROPPED = ""  # the whole hypothesis
@@ -65,14 +73,19 @@ def corrupted(name: str, old: str, new: str) -> layout.Block:
 
 
 @pytest.mark.parametrize(("name", "old", "new"), CORRUPTED)
-def test_a_corrupted_statement_is_refused_by_each_kernel(name: str, old: str, new: str,
-                                                         monkeypatch: pytest.MonkeyPatch) -> None:  # fmt: skip
+def test_a_corrupted_statement_is_refused_by_each_kernel(
+    name: str, old: str, new: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     block = corrupted(name, old, new)
     record = checked(block)
     assert record.verdict == "not proved" and any(not step.accepted for step in record.steps)
     number = len(Statement(block).tasks)
-    assert by_sympy.refusal(block, certificates(name)[:number]), "SymPy accepts the certificate of the true statement"
-    monkeypatch.setattr(Expression, "vanishes", lambda self: True)  # the kernel's own expansion is switched off
+    assert by_sympy.refusal(block, certificates(name)[:number]), (
+        "SymPy accepts the certificate of the true statement"
+    )
+    monkeypatch.setattr(
+        Expression, "vanishes", lambda self: True
+    )  # the kernel's own expansion is switched off
     assert checked(block).sympy == "no"
 
 
@@ -92,18 +105,29 @@ def test_a_corrupted_certificate_is_refused_by_each_kernel(name: str) -> None:
         if task.method:
             for source in infer(task.claim, task.method, known).sources:
                 with pytest.raises(Refused, match="matches"):
-                    infer(task.claim, task.method, Known([fact for fact in known.facts
-                                                         if fact.difference != source.difference]))
+                    infer(
+                        task.claim,
+                        task.method,
+                        Known(
+                            [fact for fact in known.facts if fact.difference != source.difference]
+                        ),
+                    )
             known.facts.append(task.claim)
             continue
         step = prove(task.claim, known, task.terms, task.cofactors)
-        for wrong in (*(replace(step, terms=(*step.terms, term)) for term in step.terms),
-                      *(replace(step, cofactors=(*step.cofactors, cofactor)) for cofactor in step.cofactors)):
-            if not remainder(wrong).vanishes():  # what is twice a number minus its transpose is still zero
+        for wrong in (
+            *(replace(step, terms=(*step.terms, term)) for term in step.terms),
+            *(replace(step, cofactors=(*step.cofactors, cofactor)) for cofactor in step.cofactors),
+        ):
+            if not remainder(
+                wrong
+            ).vanishes():  # what is twice a number minus its transpose is still zero
                 with pytest.raises(Refused, match="remain after the certificate is expanded"):
                     check_step(wrong, known)
         for line in lines[index][:1]:
-            doubled = [*lines[:index], [*lines[index], line], *lines[index + 1 :]][: len(statement.tasks)]
+            doubled = [*lines[:index], [*lines[index], line], *lines[index + 1 :]][
+                : len(statement.tasks)
+            ]
             refusal = by_sympy.refusal(statement.block, doubled)
             assert "SymPy leaves" in refusal or sympy.same(sympy.read(line.replace(" · ", " ")), 0)
         known.facts.append(task.claim)
@@ -111,7 +135,9 @@ def test_a_corrupted_certificate_is_refused_by_each_kernel(name: str) -> None:
 
 def remainder(step: Step) -> Expression:
     cofactors = (left * fact.difference * right for left, fact, right in step.cofactors)
-    return step.claim.difference - sum((*map(product, step.terms), *cofactors), product([VALUE("1 − 1")]))
+    return step.claim.difference - sum(
+        (*map(product, step.terms), *cofactors), product([VALUE("1 − 1")])
+    )
 
 
 def test_letters_do_not_commute_but_scalars_do() -> None:
@@ -119,7 +145,9 @@ def test_letters_do_not_commute_but_scalars_do() -> None:
     assert not (VALUE("B A C") - VALUE("C B A")).vanishes()
     assert (VALUE("xᵀ C x") - VALUE("xᵀ Cᵀ x")).vanishes(), "a 1 x 1 product equals its transpose"
     assert not (VALUE("C") - VALUE("Cᵀ")).vanishes()
-    assert VALUE(str(VALUE("s² (A B)ᵀ − 1/3 Bᵀ Aᵀ"))) == VALUE("s² Bᵀ Aᵀ − 1/3 Bᵀ Aᵀ"), "text is read again"
+    assert VALUE(str(VALUE("s² (A B)ᵀ − 1/3 Bᵀ Aᵀ"))) == VALUE("s² Bᵀ Aᵀ − 1/3 Bᵀ Aᵀ"), (
+        "text is read again"
+    )
 
 
 @pytest.mark.parametrize("case", ["z=1", "s=1 rest", "q=1"])
@@ -128,21 +156,37 @@ def test_a_case_gives_its_letters_and_no_others(case: str) -> None:
         holds(FACT("s = 0"), read_case(case, NAMES))
 
 
-@pytest.mark.parametrize("formula", ["A A", "A + B", "A + I", "A + ", "A B)", "(A", "A other", "x ⪰ 0", "A = B = C"])
+@pytest.mark.parametrize(
+    "formula", ["A A", "A + B", "A + I", "A + ", "A B)", "(A", "A other", "x ⪰ 0", "A = B = C"]
+)
 def test_what_is_no_formula_is_refused(formula: str) -> None:
     with pytest.raises(ArgumentError):
         FACT(formula) if re.search("[=⪰]", formula) else VALUE(formula)
 
 
-@pytest.mark.parametrize(("claim", "facts", "term", "why"), [
-    ("−xᵀ x ≥ 0", "", "−1 xᵀ x", "no earlier step"), ("−xᵀ x ≥ 0", "", "xᵀ x", "remain after"),
-    ("C C ⪰ 0", "C ⪰ 0", "C C", "no earlier step"), ("Cᵀ C ⪰ 0", "C ≥ 0", "Cᵀ C", ""),
-    ("xᵀ C y ≥ 0", "C ≥ 0; x ≥ 0; y ≥ 0", "xᵀ C y", ""), ("C C ⪰ 0", "C ≥ 0", "C C", "no earlier step"),
-    ("C ⪰ 0", "C ≥ 0", "C", "no earlier step"), ("xᵀ C y ≥ 0", "C ≻ 0", "xᵀ C y", "no earlier step"),
-    ("s ≥ 0", "", "s", "no earlier step"), ("s³ ≥ 0", "", "s³", "no earlier step"), ("x ≥ 0", "", "x", "terms show"),
-    ("C ≻ 0", "C ≻ 0", "C", "terms show"), ("s ≠ 0", "", "s", "terms show"),
-    ("s q = 0", "s ≥ 0; q ≥ 0", "s q", "terms show"), ("s² ≥ 0", "", "s s", "")])  # fmt: skip
-def test_only_squares_pairings_and_known_forms_are_not_negative(claim: str, facts: str, term: str, why: str) -> None:
+@pytest.mark.parametrize(
+    ("claim", "facts", "term", "why"),
+    [
+        ("−xᵀ x ≥ 0", "", "−1 xᵀ x", "no earlier step"),
+        ("−xᵀ x ≥ 0", "", "xᵀ x", "remain after"),
+        ("C C ⪰ 0", "C ⪰ 0", "C C", "no earlier step"),
+        ("Cᵀ C ⪰ 0", "C ≥ 0", "Cᵀ C", ""),
+        ("xᵀ C y ≥ 0", "C ≥ 0; x ≥ 0; y ≥ 0", "xᵀ C y", ""),
+        ("C C ⪰ 0", "C ≥ 0", "C C", "no earlier step"),
+        ("C ⪰ 0", "C ≥ 0", "C", "no earlier step"),
+        ("xᵀ C y ≥ 0", "C ≻ 0", "xᵀ C y", "no earlier step"),
+        ("s ≥ 0", "", "s", "no earlier step"),
+        ("s³ ≥ 0", "", "s³", "no earlier step"),
+        ("x ≥ 0", "", "x", "terms show"),
+        ("C ≻ 0", "C ≻ 0", "C", "terms show"),
+        ("s ≠ 0", "", "s", "terms show"),
+        ("s q = 0", "s ≥ 0; q ≥ 0", "s q", "terms show"),
+        ("s² ≥ 0", "", "s s", ""),
+    ],
+)
+def test_only_squares_pairings_and_known_forms_are_not_negative(
+    claim: str, facts: str, term: str, why: str
+) -> None:
     known = Known([FACT(fact) for fact in facts.split(";") if fact])
     terms = [tuple(x for x in each if isinstance(x, Expression)) for each in READER.products(term)]
     if why:
@@ -164,9 +208,15 @@ def test_a_fact_nobody_established_is_refused() -> None:
         prove(FACT("B A = I"), Known([wanted]))
 
 
-@pytest.mark.parametrize(("method", "claim", "facts"), [
-    ("cancel", "x = 0", "C ≻ 0; xᵀ C x = 0"), ("cancel", "s = 0", "−s² ≥ 0"), ("divide", "x = 0", "s ≠ 0; s x = 0"),
-    ("dominate", "s ≥ 0", "q ≥ 0; q s − s² ≥ 0")])  # fmt: skip
+@pytest.mark.parametrize(
+    ("method", "claim", "facts"),
+    [
+        ("cancel", "x = 0", "C ≻ 0; xᵀ C x = 0"),
+        ("cancel", "s = 0", "−s² ≥ 0"),
+        ("divide", "x = 0", "s ≠ 0; s x = 0"),
+        ("dominate", "s ≥ 0", "q ≥ 0; q s − s² ≥ 0"),
+    ],
+)
 def test_an_inference_needs_each_of_its_facts(method: str, claim: str, facts: str) -> None:
     both = [FACT(each) for each in facts.split(";")]
     infer(FACT(claim), method, Known(both))
@@ -192,5 +242,15 @@ def test_both_readings_agree_in_a_case() -> None:
         rows = " ".join(str(draw.randint(-2, 2)) + ";" * (i == 1) for i in range(4))
         a, b, s = (draw.randint(-1, 1) for _ in range(3))
         case = read_case(f"C=[{rows}] x=[1; {a}] y=[0; {b}] s={s} q=1/2", block.shapes)
-        for formula in ("D x = 0", "xᵀ D x ≥ 0", "D ⪰ 0", "D ≻ 0", "D ≥ 0", "(x − y)ᵀ Cᵀ (x + q y) = 0", "s ≠ 0"):
-            assert holds(statement.reader.fact(formula), case) is by_sympy.holds(block, formula, case)
+        for formula in (
+            "D x = 0",
+            "xᵀ D x ≥ 0",
+            "D ⪰ 0",
+            "D ≻ 0",
+            "D ≥ 0",
+            "(x − y)ᵀ Cᵀ (x + q y) = 0",
+            "s ≠ 0",
+        ):
+            assert holds(statement.reader.fact(formula), case) is by_sympy.holds(
+                block, formula, case
+            )

@@ -1,4 +1,5 @@
-"""The energy books of scenes: they close, the dampers only take, and what is open falls with the step."""
+"""The energy books of scenes: they close, the dampers only take, and what is open falls with the
+step."""
 
 from __future__ import annotations
 
@@ -13,7 +14,14 @@ from iapb.simulation import simulate
 from reference.worlds import run_world
 from verification.scenes import books
 
-SCENES = ("wall_1d", "peg_corner", "arm_pushing", "tumbling_body", "newton_cradle", "peg_hole_space")
+SCENES = (
+    "wall_1d",
+    "peg_corner",
+    "arm_pushing",
+    "tumbling_body",
+    "newton_cradle",
+    "peg_hole_space",
+)
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +44,8 @@ def test_books_close_on_what_they_leave_open(runs: dict[str, Run], name: str) ->
 
 
 def test_opposite_signs_do_not_cancel(runs: dict[str, Run]) -> None:
-    """In the sum with signs, the energy that the springs make up hides most of what the motion swallows."""
+    """In the sum with signs, the energy that the springs make up hides most of what the motion
+    swallows."""
     book = books.energy_book(runs["peg_hole_space"])
     assert book["residual: motion"] < 0.0 < book["residual: springs"]
     assert books.left_open(book) > 2.0 * abs(book["residual: motion"] + book["residual: springs"])
@@ -44,10 +53,15 @@ def test_opposite_signs_do_not_cancel(runs: dict[str, Run]) -> None:
 
 
 def test_curved_gaps_have_a_line_of_their_own(runs: dict[str, Run]) -> None:
-    """A gap along a slide is linear; the corners of the peg move on arcs, which shorter steps follow better."""
+    """A gap along a slide is linear; the corners of the peg move on arcs, which shorter steps
+    follow better."""
     assert abs(books.energy_book(runs["wall_1d"])["of the springs' residual, curved gaps"]) < 1e-15
-    made = [books.energy_book(simulate(load_scene(find_scene("peg_corner")).with_values({"rate": rate})))
-            ["of the springs' residual, curved gaps"] for rate in (512, 4096)]
+    made = [
+        books.energy_book(
+            simulate(load_scene(find_scene("peg_corner")).with_values({"rate": rate}))
+        )["of the springs' residual, curved gaps"]
+        for rate in (512, 4096)
+    ]
     assert abs(made[0]) > 4.0 * abs(made[1]) > 0.0
 
 
@@ -76,11 +90,16 @@ def test_springs_hold_what_the_static_overlap_says(runs: dict[str, Run]) -> None
 
 def test_a_contact_that_collides_holds_no_energy_of_a_spring(runs: dict[str, Run]) -> None:
     run = runs["wall_1d"]
-    assert len(run.impacts.step) and not books.contact_energy(run, books.scene_of(run))[0][run.impacts.step].any()
+    assert (
+        len(run.impacts.step)
+        and not books.contact_energy(run, books.scene_of(run))[0][run.impacts.step].any()
+    )
 
 
 def test_open_books_fall_with_the_step_and_a_fixed_error_does_not() -> None:
-    scene = load_scene(find_scene("tumbling_body")).with_values({"integrator": "semi_implicit_euler"})
+    scene = load_scene(find_scene("tumbling_body")).with_values(
+        {"integrator": "semi_implicit_euler"}
+    )
     row = books.open_row(scene, lambda refined: simulate(refined, world="IAPB"), (1, 2, 4))
     assert books.is_first_order(row) and row["order measured"] == pytest.approx(1.0, abs=0.1)
 

@@ -1,4 +1,5 @@
-"""The hand's port of whole device loops: the coupler's bound is sharp, and what lies beyond it leaks; what is said."""
+"""The hand's port of whole device loops: the coupler's bound is sharp, and what lies beyond it
+leaks; what is said."""
 
 from __future__ import annotations
 
@@ -29,7 +30,10 @@ def test_the_coordination_is_felt_in_the_hand_too() -> None:
     loop = study.DeviceLoop("PB", 1000.0, 0.0)
     assert needed(loop, study.PRESSES, 1.0) > 10.0
     x = study.hand_positions(loop, study.PRESSES, 1.0)
-    share = study.needed_damping(x, study.actuator_forces(loop, x), loop.dt) / loop.bound_with_coordination
+    share = (
+        study.needed_damping(x, study.actuator_forces(loop, x), loop.dt)
+        / loop.bound_with_coordination
+    )
     assert 0.95 < share < 1.05  # about the sum of the gains, and no bound: the tool moves as well
 
 
@@ -62,7 +66,9 @@ def test_sensors_are_coarse_and_late() -> None:
     assert device.read().q[0] == 0.0  # one step late
     device.apply([2.0])
     reading = device.read()
-    assert reading.q[0] == pytest.approx(1e-5, rel=1e-12) and reading.v[0] == pytest.approx(1e-5 / loop.dt, rel=1e-12)
+    assert reading.q[0] == pytest.approx(1e-5, rel=1e-12) and reading.v[0] == pytest.approx(
+        1e-5 / loop.dt, rel=1e-12
+    )
     assert device.held_forces(delay).tolist() == [0.0, 1.0]
 
 
@@ -72,8 +78,10 @@ def leaks(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, object]]:
     monkeypatch.setitem(study.SPEEDS, "quick", (1.0,))
     found = []
     for world, sensors, kind, share in (
-        ("CBuc", "ideal", study.PRESSES, 0.9), ("CBuc", "ideal", study.CROSSES, 2.0),
-        ("CBuc", "late", study.PRESSES, 4.0), ("CBuc", "late", study.CROSSES, 5.0),
+        ("CBuc", "ideal", study.PRESSES, 0.9),
+        ("CBuc", "ideal", study.CROSSES, 2.0),
+        ("CBuc", "late", study.PRESSES, 4.0),
+        ("CBuc", "late", study.CROSSES, 5.0),
         ("PB", "ideal", study.PRESSES, 70.0 / COUPLED.bound),
     ):
         monkeypatch.setattr(study, "needed_damping", lambda *_, b=share * COUPLED.bound: b)
@@ -87,13 +95,20 @@ def test_a_pressing_hand_that_needs_more_than_the_bound_refutes_it(leaks) -> Non
     assert "70 to 70 N s/m" in study.coordinated(study.PORT.table_of(leaks)).sentence
     leaks[0]["needed / bound"] = 1.001
     assert study.coupled(study.PORT.table_of(leaks)).verdict == REFUTED
-    assert leaks[1]["leak at the bound [mJ]"] > 0.0 and 0.0 < leaks[1]["leak / energy exchanged"] < 1.0
+    assert (
+        leaks[1]["leak at the bound [mJ]"] > 0.0 and 0.0 < leaks[1]["leak / energy exchanged"] < 1.0
+    )
 
 
-@pytest.mark.parametrize(("times", "verdict"), [
-    ((2.0, 1.0, 2.0, 2.0), REPRODUCED), ((None, 1.0, 1.0, 2.0), MIXED), ((1.0, 2.0, 1.0, None), REFUTED),
-    ((None, None, None, None), NOT_TESTABLE),
-])
+@pytest.mark.parametrize(
+    ("times", "verdict"),
+    [
+        ((2.0, 1.0, 2.0, 2.0), REPRODUCED),
+        ((None, 1.0, 1.0, 2.0), MIXED),
+        ((1.0, 2.0, 1.0, None), REFUTED),
+        ((None, None, None, None), NOT_TESTABLE),
+    ],
+)
 def test_the_peg_rests_no_later_with_impulses(times, verdict) -> None:
     rests, bounces = peg(PEG.table_of({"settles after [s]": time, "bounces": 1} for time in times))
     assert rests.verdict == verdict and bounces.verdict == REPRODUCED
@@ -102,4 +117,8 @@ def test_the_peg_rests_no_later_with_impulses(times, verdict) -> None:
 def test_more_bounces_with_impulses_are_a_finding_of_their_own() -> None:
     rows = [{"settles after [s]": 1.0, "bounces": bounces} for bounces in (1, 2, 2, 2)]
     rests, bounces = peg(PEG.table_of(rows))
-    assert rests.verdict == REPRODUCED and bounces.verdict == MIXED and "in 1 of 2 " in bounces.measured
+    assert (
+        rests.verdict == REPRODUCED
+        and bounces.verdict == MIXED
+        and "in 1 of 2 " in bounces.measured
+    )

@@ -36,7 +36,10 @@ def test_a_stiff_undamped_wall_makes_the_hand_faster_and_a_soft_damped_one_holds
 
 def test_stiff_walls_at_1_khz_bounce_on_below_the_speed_of_rest() -> None:
     """Such walls do not count as stable, although the mass is slower than the speed of rest."""
-    short, long = (at(study.Loop(rate=1000.0, seconds=seconds), 3e5, 0.0, study.IMPULSES) for seconds in (3.0, 12.0))
+    short, long = (
+        at(study.Loop(rate=1000.0, seconds=seconds), 3e5, 0.0, study.IMPULSES)
+        for seconds in (3.0, 12.0)
+    )
     assert (long.bounces > 3 * short.bounces).all() and not (short.settled | long.settled).any()
     assert (short.outcomes == study.BOUNCES_ON).all() and np.isinf(short.settles_after).all()
 
@@ -50,9 +53,13 @@ def test_a_plastic_impulse_stops_the_mass_on_touching() -> None:
 
 def test_rate_hardness_of_an_impulse_does_not_know_the_wall() -> None:
     stiffness = np.array([100.0, 1e4])
-    hardness = study.touch_walls(study.Loop(), stiffness, np.array([50.0, 50.0]), study.IMPULSES).rate_hardness
+    hardness = study.touch_walls(
+        study.Loop(), stiffness, np.array([50.0, 50.0]), study.IMPULSES
+    ).rate_hardness
     assert hardness[0] == pytest.approx(hardness[1], rel=1e-12)
-    theirs = study.touch_walls(study.Loop(), stiffness, np.array([50.0, 50.0]), study.PENALTY).rate_hardness
+    theirs = study.touch_walls(
+        study.Loop(), stiffness, np.array([50.0, 50.0]), study.PENALTY
+    ).rate_hardness
     assert theirs[1] > theirs[0]
 
 
@@ -70,6 +77,9 @@ def test_c20_holds_and_would_not_with_the_bound_in_the_wrong_place() -> None:
     claim = CLAIMS["C20"]
     table = claim.table(Study())
     assert table.passed is True
-    moved = [dict(row, **{"virtual damping": 2.0 * row["virtual damping"]}) for row in table.records()
-             if row["virtual damping"] == 0.95]  # fmt: skip
+    moved = [
+        dict(row, **{"virtual damping": 2.0 * row["virtual damping"]})
+        for row in table.records()
+        if row["virtual damping"] == 0.95
+    ]
     assert not any(claim.holds(row) for row in moved)

@@ -1,4 +1,5 @@
-"""Worlds on one scene: distances are those of closed forms, what fails is named, impacts reach every solver."""
+"""Worlds on one scene: distances are those of closed forms, what fails is named, impacts reach
+every solver."""
 
 from __future__ import annotations
 
@@ -36,12 +37,20 @@ def test_a_box_that_slides_is_apart_from_one_that_sticks_by_the_closed_forms():
     # Half a step of 1 ms in 0.2 s: 0.5 % of the way; the others are exact.
     assert slides["configuration, end"] == pytest.approx(0.5 * down * 0.2**2, rel=0.006)
     assert slides["velocity, end"] == pytest.approx(down * 0.2, rel=1e-6)
-    assert slides["impulse, end"] == pytest.approx(1.0 * down * 0.2, rel=1e-6)  # the friction that is missing, m = 1 kg
+    assert slides["impulse, end"] == pytest.approx(
+        1.0 * down * 0.2, rel=1e-6
+    )  # the friction that is missing, m = 1 kg
     assert slides["configuration, most"] == slides["configuration, end"]
     sticks = row(found, "ideal-friction")
     assert sticks["configuration, rms"] is None and sticks["law"] == "rigid constraints"
-    assert (slides["ignores"], sticks["ignores"]) == ("friction, stiffness, damping", "stiffness, damping")
-    assert sticks["time per step"] > 0.0 and min(slides["times the fastest"], sticks["times the fastest"]) == 1.0
+    assert (slides["ignores"], sticks["ignores"]) == (
+        "friction, stiffness, damping",
+        "stiffness, damping",
+    )
+    assert (
+        sticks["time per step"] > 0.0
+        and min(slides["times the fastest"], sticks["times the fastest"]) == 1.0
+    )
 
 
 def test_a_hinge_and_a_ball_count_by_their_inertia():
@@ -53,7 +62,9 @@ def test_a_hinge_and_a_ball_count_by_their_inertia():
     assert row(found, "PB")["configuration, end"] == pytest.approx(np.sqrt(squares / 8.5), rel=1e-9)
     overlap = 1e3 * max(-runs["PB"].contacts.gap.min(), 0.0)
     assert row(found, "PB")["deepest overlap"] == pytest.approx(overlap)
-    assert max(found.tables["over time"].where(world="PB").column("penetration")) == pytest.approx(1e-3 * overlap)
+    assert max(found.tables["over time"].where(world="PB").column("penetration")) == pytest.approx(
+        1e-3 * overlap
+    )
     lost = 1.045 - runs["IAPB"].energy["kinetic"][-1]  # ½ 0.5 (0.3² + 2²) at the start
     assert row(found, "IAPB")["energy lost"] == pytest.approx(lost - 0.0225, abs=1e-9)
 
@@ -62,7 +73,10 @@ def test_the_reference_world_joins():
     assert default_worlds(SLOPE) == ("IAPB", "PB", "IAPB-friction", "ideal", "ideal-friction")
     smooth = SLOPE.with_values({"contact.friction": 0.0, "duration": 0.002})
     found = compare_worlds(smooth, ["PB"], impacts=0)
-    assert found.tables["worlds"].column("world") == ["PB", "ideal"] and found.details["against"] == "ideal"
+    assert (
+        found.tables["worlds"].column("world") == ["PB", "ideal"]
+        and found.details["against"] == "ideal"
+    )
 
 
 def test_a_world_that_fails_is_named_and_the_others_are_compared(monkeypatch):
@@ -77,7 +91,9 @@ def test_a_world_that_fails_is_named_and_the_others_are_compared(monkeypatch):
     assert found.tables["worlds"].column("world") == ["IAPB", "ideal"]
     assert found.verdict == NOT_COMPUTED
     assert [(one.case, one.reason) for one in found.failures] == [("world PB", "no solution")]
-    with pytest.raises(IapbError, match="cannot be simulated in the reference world PB.*no solution"):
+    with pytest.raises(
+        IapbError, match="cannot be simulated in the reference world PB.*no solution"
+    ):
         compare_worlds(short, ["IAPB", "PB"], "PB", impacts=0)
 
 
@@ -91,13 +107,23 @@ def test_worlds_that_stop_early_or_are_not_to_be_trusted_are_not_ranked(monkeypa
     found = compare_worlds(short, ["IAPB", "PB", "IAPB-friction", "ideal"], "IAPB", impacts=0)
     assert row(found, "PB")["simulated until"] == pytest.approx(0.007)
     assert len(found.tables["over time"].where(world="PB").rows) == 8
-    assert row(found, "PB")["configuration, rms"] < row(found, "ideal")["configuration, rms"]  # nearest, for it stopped
-    assert "Closest to IAPB is ideal" in found.answer and "Not ranked: PB stopped after 0.007 s" in found.answer
+    assert (
+        row(found, "PB")["configuration, rms"] < row(found, "ideal")["configuration, rms"]
+    )  # nearest, for it stopped
+    assert (
+        "Closest to IAPB is ideal" in found.answer
+        and "Not ranked: PB stopped after 0.007 s" in found.answer
+    )
     assert "IAPB-friction not to be trusted: the box flew." in found.answer
     (part,) = found.parts
     assert (part.verdict, part.held, part.decided) == (MIXED, 2, 4)
-    assert "No world can be compared with IAPB" in compare_worlds(short, ["IAPB", "PB"], "IAPB", impacts=0).answer
-    assert "the reference PB stopped" in compare_worlds(short, ["IAPB", "PB"], "PB", impacts=0).answer
+    assert (
+        "No world can be compared with IAPB"
+        in compare_worlds(short, ["IAPB", "PB"], "IAPB", impacts=0).answer
+    )
+    assert (
+        "the reference PB stopped" in compare_worlds(short, ["IAPB", "PB"], "PB", impacts=0).answer
+    )
 
 
 def wrong(problem):
@@ -107,37 +133,71 @@ def wrong(problem):
 
 def test_every_solver_is_judged_on_the_impacts_by_residuals(monkeypatch):
     load = solvers._load
-    monkeypatch.setattr(solvers, "_load", lambda name, entry: wrong if name.startswith("wrong") else load(name, entry))
+    monkeypatch.setattr(
+        solvers,
+        "_load",
+        lambda name, entry: wrong if name.startswith("wrong") else load(name, entry),
+    )
     kept = {"gauss_seidel": "lcp", "nsgs": "cone", "wrong": "lcp", "wrong with friction": "cone"}
     for name, takes in kept.items():
-        monkeypatch.setitem(SOLVERS, name, SOLVERS.get(name) or SolverEntry("nowhere", "numba", "", takes))
+        monkeypatch.setitem(
+            SOLVERS, name, SOLVERS.get(name) or SolverEntry("nowhere", "numba", "", takes)
+        )
 
     def asked(names):
         def chosen(problem):
-            return [name for name in names if (kept[name] == "cone") == (problem.friction is not None)]
+            return [
+                name for name in names if (kept[name] == "cone") == (problem.friction is not None)
+            ]
 
         for module in (problem_files, benchmark):
             monkeypatch.setattr(module, "solver_names", chosen)
         return compare_worlds(DOOR, ["IAPB"], "IAPB", impacts=2)
 
     found = asked(kept)
-    rows = {one["solver"]: (one["solved"], one["failed"], one["problems"]) for one in found.tables["solvers"].records()}
-    assert rows == {"gauss_seidel": (1, 0, 1), "nsgs": (1, 0, 1), "wrong": (0, 1, 1), "wrong with friction": (0, 1, 1)}
+    rows = {
+        one["solver"]: (one["solved"], one["failed"], one["problems"])
+        for one in found.tables["solvers"].records()
+    }
+    assert rows == {
+        "gauss_seidel": (1, 0, 1),
+        "nsgs": (1, 0, 1),
+        "wrong": (0, 1, 1),
+        "wrong with friction": (0, 1, 1),
+    }
     part = {part.name: part for part in found.parts}["solvers"]
     assert (part.verdict, part.held, part.decided) == (MIXED, 2, 4)
-    assert "2 of 4 answers" in part.sentence and "Wrong answers: wrong 1, wrong with friction 1." in part.sentence
+    assert (
+        "2 of 4 answers" in part.sentence
+        and "Wrong answers: wrong 1, wrong with friction 1." in part.sentence
+    )
     right = asked(["gauss_seidel", "nsgs"])
-    assert {part.name: part.verdict for part in right.parts} == dict.fromkeys(("runs", "motion", "solvers"), REPRODUCED)
+    assert {part.name: part.verdict for part in right.parts} == dict.fromkeys(
+        ("runs", "motion", "solvers"), REPRODUCED
+    )
     alone = asked(["wrong", "wrong with friction"])
     assert {part.name: part.verdict for part in alone.parts}["solvers"] == MIXED
 
 
 def test_the_problems_of_a_rough_impact_have_normals_and_tangents():
     (smooth, rough), left_out = problems_of_run(run_world(DOOR, "IAPB"), DOOR, 1)
-    assert left_out == 0 and smooth.friction is None and rough.friction.tolist() == [0.2] and rough.contact_size == 2
+    assert (
+        left_out == 0
+        and smooth.friction is None
+        and rough.friction.tolist() == [0.2]
+        and rough.contact_size == 2
+    )
     normal, tangent = rough.contact_jacobian
     assert np.array_equal(normal, smooth.contact_jacobian[0])
-    # The ball moves by (x, y, turn): unit directions at right angles, and its radius along the tangent.
-    assert np.hypot(*tangent[1:3]) == pytest.approx(1.0) and tangent[1:3] @ normal[1:3] == pytest.approx(0.0, abs=1e-12)
+    # The ball moves by (x, y, turn): unit directions at right angles, and its radius along the
+    # tangent.
+    assert np.hypot(*tangent[1:3]) == pytest.approx(1.0) and tangent[1:3] @ normal[
+        1:3
+    ] == pytest.approx(0.0, abs=1e-12)
     assert abs(tangent[3]) == pytest.approx(0.05) and normal[3] == pytest.approx(0.0, abs=1e-12)
-    assert problems_of_run(run_world(SLOPE, "IAPB"), SLOPE.with_values({"contact.friction": 0.0}), 3)[0] == ()
+    assert (
+        problems_of_run(run_world(SLOPE, "IAPB"), SLOPE.with_values({"contact.friction": 0.0}), 3)[
+            0
+        ]
+        == ()
+    )

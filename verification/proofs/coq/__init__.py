@@ -1,1 +1,2 @@
-"""The Coq development: `make -C verification/proofs/coq` compiles it and leaves checked.json (see `checked`)."""
+"""The Coq development: `make -C verification/proofs/coq` compiles it and leaves checked.json (see
+`checked`)."""

@@ -1,12 +1,13 @@
-"""What Coq accepted: `make -C verification/proofs/coq` compiles the sources and writes it to checked.json.
+"""What Coq accepted: `make -C verification/proofs/coq` compiles the sources and writes it to
+checked.json.
 
-`Checker.v` verifies an exact judge of impacts and extracts it to OCaml; `checker.ml` reads the file that
-`iapb certify --export` writes. `Passive.v`, `Accepted.v` and `Wide.v` prove with Flocq what the resolver's last step
-accepts. `Theorems.v` states Theorems 1 and 2 and (33) by hand.
+`Checker.v` verifies an exact judge of impacts and extracts it to OCaml; `checker.ml` reads the file
+that `iapb certify --export` writes. `Passive.v`, `Accepted.v` and `Wide.v` prove with Flocq what
+the resolver's last step accepts. `Theorems.v` states Theorems 1 and 2 and (33) by hand.
 
-checked.json holds the version of Coq, the hash of each source, and the axioms of each theorem. If the file is missing,
-or was made from other sources, Coq has not run. The Makefile calls this module as a script, without the project's
-packages: it imports the standard library only.
+checked.json holds the version of Coq, the hash of each source, and the axioms of each theorem. If
+the file is missing, or was made from other sources, Coq has not run. The Makefile calls this module
+as a script, without the project's packages: it imports the standard library only.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ STATEMENTS = (
     "Theorems"  # the file with theorems that are also statements of the kernel, by the same names
 )
 NOT_RUN = "not run"
-# Axioms that `Print Assumptions` may list: those from which Coq's library builds the real numbers, and classical
-# logic (P or not P, for every P), which Flocq uses.
+# Axioms that `Print Assumptions` may list: those from which Coq's library builds the real numbers,
+# and classical logic (P or not P, for every P), which Flocq uses.
 KNOWN_AXIOMS = frozenset(
     {
         "ClassicalDedekindReals.sig_forall_dec",
@@ -82,7 +83,8 @@ class Development:
 
 
 def read(folder: Path = FOLDER) -> Development:
-    """Return the theorems of the sources in `folder`, with Coq's answers if checked.json was made from them."""
+    """Return the theorems of the sources in `folder`, with Coq's answers if checked.json was made
+    from them."""
     stated = _stated(folder)
     path = folder / "checked.json"
     found = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
@@ -137,7 +139,8 @@ def _stated(folder: Path) -> tuple[Theorem, ...]:
 
 
 def _axioms(printed: str) -> list[tuple[str, ...]]:
-    """Return the axioms that each `Print Assumptions` lists: the unindented lines after "Axioms:"."""
+    """Return the axioms that each `Print Assumptions` lists: the unindented lines after
+    "Axioms:"."""
     answers = re.split(
         r"^(?:Axioms:|Closed under the global context)", printed, flags=re.MULTILINE
     )[1:]

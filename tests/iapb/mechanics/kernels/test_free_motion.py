@@ -20,32 +20,66 @@ def scene(*bodies: dict[str, Any], **values: Any) -> Scene:
 
 
 def body(spin: float, **values: Any) -> dict[str, Any]:
-    return {"name": "body", "joint": "free_flyer", "mass": 1.3, "inertia": [1e-3, 2e-3, 2.5e-3],
-            "velocity": [3.0, 0.0, -1.0, 0.3 * spin, 0.8 * spin, 0.5 * spin]} | values
+    return {
+        "name": "body",
+        "joint": "free_flyer",
+        "mass": 1.3,
+        "inertia": [1e-3, 2e-3, 2.5e-3],
+        "velocity": [3.0, 0.0, -1.0, 0.3 * spin, 0.8 * spin, 0.5 * spin],
+    } | values
 
 
-LINK = {"joint": "revolute", "mass": 0.4, "center_of_mass": [0.1, 0, 0], "inertia": [1e-4, 2e-3, 2e-3]}
-ROBOT = (body(3.0, center_of_mass=[0.02, 0.01, -0.03]),
-         LINK | {"name": "one", "parent": "body", "axis": [0, 0.6, 0.8], "origin": [0.1, 0, 0], "velocity": [5.0]},
-         LINK | {"name": "two", "parent": "one", "axis": [1, 0, 1], "origin": [0.2, 0, 0], "velocity": [-8.0]})
+LINK = {
+    "joint": "revolute",
+    "mass": 0.4,
+    "center_of_mass": [0.1, 0, 0],
+    "inertia": [1e-4, 2e-3, 2e-3],
+}
+ROBOT = (
+    body(3.0, center_of_mass=[0.02, 0.01, -0.03]),
+    LINK
+    | {
+        "name": "one",
+        "parent": "body",
+        "axis": [0, 0.6, 0.8],
+        "origin": [0.1, 0, 0],
+        "velocity": [5.0],
+    },
+    LINK
+    | {
+        "name": "two",
+        "parent": "one",
+        "axis": [1, 0, 1],
+        "origin": [0.2, 0, 0],
+        "velocity": [-8.0],
+    },
+)
 FLAT = {"joint": "revolute", "mass": 0.4, "center_of_mass": [0.1, 0], "inertia": 2e-3}
-FLAT_ROBOT = ({"name": "body", "joint": "planar", "mass": 1.0, "inertia": 1e-2, "velocity": [1.0, -2.0, 4.0]},
-              FLAT | {"name": "one", "parent": "body", "origin": [0.1, 0], "velocity": [5.0]},
-              FLAT | {"name": "two", "parent": "one", "origin": [0.2, 0], "velocity": [-9.0]})
+FLAT_ROBOT = (
+    {"name": "body", "joint": "planar", "mass": 1.0, "inertia": 1e-2, "velocity": [1.0, -2.0, 4.0]},
+    FLAT | {"name": "one", "parent": "body", "origin": [0.1, 0], "velocity": [5.0]},
+    FLAT | {"name": "two", "parent": "one", "origin": [0.2, 0], "velocity": [-9.0]},
+)
 CASES = {
-    "a body at 100 rad/s": scene(body(100.0)), "a body at 1000 rad/s": scene(body(1000.0), duration=0.2),
+    "a body at 100 rad/s": scene(body(100.0)),
+    "a body at 1000 rad/s": scene(body(1000.0), duration=0.2),
     "a plate": scene(body(100.0, inertia=[7.5e-3, 3.3e-3, 1.1e-2])),
     "a rod": scene(body(1000.0, inertia=[4e-5, 1.3e-2, 1.3e-2]), duration=0.2),
     "a ball": scene(body(1000.0, inertia=[4e-3] * 3)),
     "its centre elsewhere": scene(body(50.0, center_of_mass=[0.1, -0.2, 0.05])),
-    "turned inertia": scene(body(50.0, inertia=[[2e-3, 3e-4, 1e-4], [3e-4, 2e-3, -2e-4], [1e-4, -2e-4, 3e-3]])),
-    "a floating robot": scene(*ROBOT), "a planar one": scene(*FLAT_ROBOT),
+    "turned inertia": scene(
+        body(50.0, inertia=[[2e-3, 3e-4, 1e-4], [3e-4, 2e-3, -2e-4], [1e-4, -2e-4, 3e-3]])
+    ),
+    "a floating robot": scene(*ROBOT),
+    "a planar one": scene(*FLAT_ROBOT),
 }
 
 
 def momenta(run: Run, given: Scene) -> np.ndarray:
     mechanism = mechanism_of(given)
-    return np.array([mechanism.centroidal_momentum(q, v) for q, v in zip(run.q[::50], run.v[::50], strict=True)])
+    return np.array(
+        [mechanism.centroidal_momentum(q, v) for q, v in zip(run.q[::50], run.v[::50], strict=True)]
+    )
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -56,7 +90,9 @@ def test_both_momenta_are_kept_to_rounding_and_the_energy_nearly(name: str) -> N
         drift = np.abs(found[:, part] - found[0, part]).max()
         assert drift <= 3e-15 * run.steps * np.abs(found[0]).max()
     kinetic = run.energy["kinetic"]
-    assert np.abs(kinetic / kinetic[0] - 1.0).max() < (1e-12 if "robot" in name or "planar" in name else 1e-6)
+    assert np.abs(kinetic / kinetic[0] - 1.0).max() < (
+        1e-12 if "robot" in name or "planar" in name else 1e-6
+    )
 
 
 def test_principal_axes_turn_the_inertia_into_its_moments() -> None:
