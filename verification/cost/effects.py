@@ -121,14 +121,15 @@ def effects_of_scenes(
     """Return the measured effects of each shipped scene in the IAPB world."""
     names, found = scene_names(), dict[str, Table]()
     for name in counted(names, progress) if progress else names:
-        table = attempt(
-            name,
-            lambda name=name: effects_of(load_scene(find_scene(name)), failures=failures),
-            failures,
-        )  # type: ignore[misc]
+        measure = partial(_effects_of_shipped, name, failures)
+        table = attempt(name, measure, failures)
         if table is not None:
             found[name] = table
     return found
+
+
+def _effects_of_shipped(name: str, failures: list[Failure] | None) -> Table:
+    return effects_of(load_scene(find_scene(name)), failures=failures)
 
 
 def effects_of(
