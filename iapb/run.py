@@ -28,6 +28,7 @@ UNSOLVED = (
     "resting contact was not solved to rounding, and velocities were shortened"  # begins a remark
 )
 STATE_NAMES = ("free", "colliding", "resting")
+INTERRUPTED = "interrupted"  # value of `Run.stopped` after Ctrl-C
 _SHOWN = 12  # most coordinates that a plot or a table shows
 
 # Units of generalized quantities follow the unit of their coordinate or of their velocity.

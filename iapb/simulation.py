@@ -37,7 +37,7 @@ from iapb.haptics.coupling import Coupling, NoCoupling
 from iapb.haptics.device import Device, DeviceLink
 from iapb.haptics.rendering import NO_COUPLING, couple, move_device, render
 from iapb.recording import Recorder, make_record, write_step
-from iapb.run import COLLIDING, FREE, RESTING, Run
+from iapb.run import COLLIDING, FREE, INTERRUPTED, RESTING, Run
 from iapb.scene import Scene, find_scene, load_scene
 from iapb.scene.mechanism import wrench_of
 from iapb.system import System, system_of
@@ -80,8 +80,6 @@ def compiled_steps(world, state, port, record, part, first, steps):  # type: ign
 
 
 _STEP_VECTORS = ("q", "v", "penalty_force", "friction_force", "impulse")
-
-INTERRUPTED = "interrupted"  # value of `Run.stopped` after Ctrl-C
 
 
 class Simulation:

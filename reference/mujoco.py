@@ -40,7 +40,7 @@ from iapb.errors import IapbError
 from iapb.lazy import needed
 from iapb.mechanics.bodies import Body
 from iapb.mechanics.joints import KINDS
-from iapb.run import Run
+from iapb.run import INTERRUPTED, Run
 from iapb.scene import Scene
 from iapb.scene import mechanism as scene_parts
 from reference import Floats
@@ -50,7 +50,6 @@ LEAST_RESTITUTION = math.exp(-2.0)  # of a critically damped spring
 LEAST = 1e-12  # [kg, kg m2] MuJoCo takes no moving body without mass and inertia
 STEPS_BETWEEN_REPORTS = 512
 UNSTABLE = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")
-INTERRUPTED = "interrupted"
 TURNING = ("spherical", "free_flyer")  # joints with a quaternion
 
 _mujoco = cache(partial(needed, "mujoco", "The world mujoco"))
@@ -123,7 +122,7 @@ class MuJoCo:
         warnings = [getattr(mujoco.mjtWarning, name) for name in UNSTABLE]
         done, stopped, started = 0, "", time.perf_counter()
         try:
-            while done < total and not stopped:
+            while done < total:
                 self.step(scene, model, data, (done + 0.5) * scene.step)
                 if any(data.warning[name].number for name in warnings):
                     stopped = f"MuJoCo warns of an unstable simulation at {data.time:g} s"
@@ -133,6 +132,8 @@ class MuJoCo:
                 if progress is not None and (done % STEPS_BETWEEN_REPORTS == 0 or done == total):
                     progress(done, total)
         except KeyboardInterrupt:
+            if done == 0:
+                raise
             stopped = INTERRUPTED
         if done == 0:
             raise IapbError(stopped)
@@ -160,6 +161,7 @@ class MuJoCo:
         """Return the scene as a compiled model."""
         mujoco = _mujoco()
         spec = mujoco.MjSpec()
+        spec.compiler.degree = False  # limits of hinges are in radians
         spec.compiler.boundmass = spec.compiler.boundinertia = LEAST
         spec.option.timestep = scene.step / self.substeps
         spec.option.gravity = [*(scene.gravity or ()), 0.0, 0.0, 0.0][:3]

@@ -13,9 +13,8 @@ import typer
 from iapb.advice.checks import check_scene
 from iapb.advice.effects import ignored_fields
 from iapb.compiling import to_stderr
-from iapb.run import Run
+from iapb.run import INTERRUPTED, Run
 from iapb.scene import Scene, find_scene, load_scene, scene_names
-from iapb.simulation import INTERRUPTED
 from iapb.system import System
 from iapb.worlds import find_world
 from reports.runner import Runner

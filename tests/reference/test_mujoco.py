@@ -147,6 +147,13 @@ def test_each_pair_has_its_own_friction_and_restitution() -> None:
     assert model.pair_solref[0] == pytest.approx(MuJoCo().solref(0.3, 1e-3))
 
 
+def test_the_limits_of_a_hinge_are_in_radians() -> None:
+    scene = CASES["slider_on_a_turning_arm"].scene
+    arm = scene["bodies"][0] | {"joint_limits": [-1, 2]}
+    model = MuJoCo().model(scene_from_values(scene | {"bodies": [arm]}))
+    assert list(model.jnt_range[0]) == [-1, 2]
+
+
 def test_an_unstable_simulation_ends_and_says_why() -> None:
     run = MuJoCo(impact_steps=1e-4).run(ball(1.0))
     assert not run.complete and "unstable" in run.stopped
