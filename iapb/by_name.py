@@ -12,11 +12,9 @@ from iapb.errors import ArgumentError
 from iapb.names import nearest
 
 
-def function_named(
-    argument: str, name: str, form: str = "package.module:function"
-) -> Callable[..., Any]:
+def function_named(argument: str, name: str) -> Callable[..., Any]:
     """Import a function like `object_named`."""
-    function: Callable[..., Any] = object_named(argument, name, form)
+    function: Callable[..., Any] = object_named(argument, name, "package.module:function")
     if not callable(function):
         raise ArgumentError(argument, name, "something that can be called")
     return function
@@ -25,8 +23,8 @@ def function_named(
 def object_named(argument: str, name: str, form: str) -> Any:
     """Import an object, also from the working directory; raise ArgumentError if that fails.
 
-    argument : the command-line option that the name was given for; form : the expected form of the
-        name
+    argument : the option or argument that the name was given for
+    form : the expected form of the name
     """
     module, colon, attribute = name.partition(":")
     if not (module and colon and attribute):

@@ -63,7 +63,9 @@ class Engine(Protocol):
 
 def is_engine(law: Any) -> TypeGuard[Engine]:
     """Whether this is an engine; a contact law advances single steps and has no `run`."""
-    return all(hasattr(law, name) for name in ("name", "settings", "ignored", "run"))
+    return not isinstance(law, type) and all(
+        hasattr(law, name) for name in ("name", "settings", "ignored", "run")
+    )
 
 
 def fields_of_our_engine(scene: Scene) -> tuple[str, ...]:

@@ -7,11 +7,10 @@
   columns does `lcp_Pang_isolated_sol` have a solution, and `lcp_CPS_2` equal example 4.4.7 of
   Cottle, Pang, Stone (1992).
 - .hdf5, .h5: the FrictionalContactLibrary (normal component first). fclib_local : u = W r + q;
-  fclib_global : M v = H r + f, u = Hᵀ v + w. Both have friction mu per contact and a solution (r,
-      u, v). A solution of
-  zeros counts as absent, because unsolved files have one. A global problem is condensed with sparse
-  factors: W = Hᵀ M⁻¹ H, q = w + Hᵀ M⁻¹ f. The result includes its mechanics (M, J = Hᵀ) if w = 0
-  and it has at most WITH_MECHANICS coordinates.
+  fclib_global : M v = H r + f, u = Hᵀ v + w. Both have friction mu per contact and a solution
+  (r, u, v). A solution of zeros counts as absent, because unsolved files have one. A global problem
+  is condensed with sparse factors: W = Hᵀ M⁻¹ H, q = w + Hᵀ M⁻¹ f. The result includes its
+  mechanics (M, J = Hᵀ) if w = 0 and it has at most WITH_MECHANICS coordinates.
 
 Source: Acary, Brémond, Koziara, Pérignon, FCLIB: a collection of discrete 3D frictional contact
 problems (2014).
