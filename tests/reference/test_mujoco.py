@@ -148,9 +148,8 @@ def test_each_pair_has_its_own_friction_and_restitution() -> None:
 
 
 def test_the_limits_of_a_hinge_are_in_radians() -> None:
-    scene = CASES["slider_on_a_turning_arm"].scene
-    arm = scene["bodies"][0] | {"joint_limits": [-1, 2]}
-    model = MuJoCo().model(scene_from_values(scene | {"bodies": [arm]}))
+    scene = scene_from_values(CASES["slider_on_a_turning_arm"].scene)
+    model = MuJoCo().model(scene.with_values({"bodies.arm.joint_limits": [-1, 2]}))
     assert list(model.jnt_range[0]) == [-1, 2]
 
 
