@@ -100,15 +100,21 @@ def simulate_point(scene: Scene, folder: Path, code: str, point: dict[str, Any])
     except Exception as error:  # costs this row
         return point | {"error": said(error, "")}
     [stored] = runner.used
-    return point | {
+    contacts = {  # an engine that gives states alone leaves them missing
         "impacts": len(run.impacts.step),
         "energy_lost": run.impacts.energy_lost.sum(),
         "penetration": max(0.0, -run.contacts.gap.min(initial=0.0)),
-        "kinetic_energy": run.energy.get("kinetic", [math.nan])[-1],
-        "distrust": "; ".join(run.distrust),
-        "file": stored,
-        "error": "",
     }
+    return (
+        point
+        | (contacts if run.records_contacts else {})
+        | {
+            "kinetic_energy": run.energy.get("kinetic", [math.nan])[-1],
+            "distrust": "; ".join(run.distrust),
+            "file": stored,
+            "error": "",
+        }
+    )
 
 
 def write_points(path: Path, study: Study, rows: list[dict[str, Any]]) -> None:

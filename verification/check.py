@@ -5,9 +5,10 @@ Every study is one or more Checks. Its functions know only their case; the runne
 knows failures, progress, depth and tables. No verdict is written by hand: it follows from the
 outcomes of the rows.
 
-    Check.finding(study)              a claim: each part is judged, a region is searched where a
-    part is mixed Topic(run, depth, progress)       a section of the report: each check gives a
-    table and its sentences
+    Check.finding(study)          a claim: each part is judged, a region is searched where a part
+                                  is mixed
+    Topic(run, depth, progress)   a section of the report: each check gives a table and its
+                                  sentences
 """
 
 from __future__ import annotations

@@ -5,13 +5,13 @@ There are three distances. Each uses the kinetic metric M(q) at the reference wo
 and the scene's total mass m, so that joints and free bodies, metres and radians have comparable
 weights:
 
-    configuration  √(Δqᵀ M Δq / m)   [m]     root mean square displacement over all mass (to first
-    order) velocity       √(Δvᵀ M Δv / m)   [m/s]   root mean square velocity difference over all
-    mass impulse        √(m ΔPᵀ M⁻¹ ΔP)   [N s]   P is the sum of all contact impulses so far, since
-    single contacts need not
-                                             be unique: their resultant if M is constant; otherwise
-                                             the sum of generalized impulses, each with the Jacobian
-                                             of its own pose
+    configuration  √(Δqᵀ M Δq / m)  [m]    root mean square displacement over all mass
+    velocity       √(Δvᵀ M Δv / m)  [m/s]  root mean square velocity difference over all mass
+    impulse        √(m ΔPᵀ M⁻¹ ΔP)  [N s]  of the sum P of all contact impulses so far
+
+The first is exact to first order. P is compared, since single contacts need not be unique: it is
+their resultant if M is constant; otherwise the sum of generalized impulses, each with the Jacobian
+of its own pose.
 
 Every complementarity solver then solves the scene's impacts in IAPB; recomputed residuals judge the
 answers.

@@ -1,7 +1,7 @@
 """RunStore: a folder of runs, one HDF5 file each; no run is computed twice.
 
     store = RunStore("out/runs")
-    run = store.get_or_run(inputs, lambda: simulate(scene, law))
+    run, entry = store.fetch(store.place_of(inputs), lambda: simulate(scene, law))
 
 A file is named by a label and its run key, the hash of everything that determines the run. A run
 that gave up is stored as ``<name>.h5.partial``, for readers, and is computed again next time. A
@@ -75,13 +75,10 @@ class RunStore:
             else min(self.folder.glob(f"*-{key[:_KEY_DIGITS]}.h5"), default=path),
         )
 
-    def get_or_run(
-        self, inputs: Mapping[str, Any], compute: Callable[[], Run], label: str = "run"
-    ) -> Run:
-        """Return the run of `inputs` (everything that determines it): read it, or compute and store
-        it.
+    def fetch(self, place: Place, compute: Callable[[], Run]) -> tuple[Run, RunEntry]:
+        """Return the run of a place and the entry of its file: read it, or compute and store it.
 
-        It has ``complete=False`` if `compute` gave up early. Then it is stored as partial and
+        The run has ``complete=False`` if `compute` gave up early. Then it is stored as partial and
         computed again next time.
 
         Raises
@@ -90,10 +87,6 @@ class RunStore:
             The file is damaged. A damaged file is not replaced automatically: remove it to compute
             the run again.
         """
-        return self.fetch(self.place_of(inputs, label), compute)[0]
-
-    def fetch(self, place: Place, compute: Callable[[], Run]) -> tuple[Run, RunEntry]:
-        """Return the run of a place and the entry of its file; see `get_or_run`."""
         if place.path.is_file():
             run, entry = read_stored(place.path)
             if entry.run_key != place.key:
@@ -105,14 +98,6 @@ class RunStore:
         if not isinstance(run, Run):
             raise ArgumentError("compute", run, "a function that returns a Run")
         return run, self._keep(place, run)
-
-    def put(self, inputs: Mapping[str, Any], run: Run, label: str = "run") -> Path:
-        """Store a finished run and return its file; an existing file is not changed."""
-        if not run.complete:
-            raise ArgumentError("run.complete", run.complete, "True: a finished run")
-        place = self.place_of(inputs, label)
-        self._keep(place, run)
-        return place.path
 
     def _keep(self, place: Place, run: Run) -> RunEntry:
         if not run.complete:

@@ -5,8 +5,9 @@ reader.
     /trajectory               states at n + 1 instants
     /steps                    forces, impulse and contact state of the n steps between them
     /contacts                 a ragged table: the contacts of step k are the rows
-    offsets[k]:offsets[k + 1] /impacts                  one row per step and island of a colliding
-    group /energy                   the energy balance, at instants and over steps
+                              offsets[k]:offsets[k + 1]
+    /impacts                  one row per step and island of a colliding group
+    /energy                   the energy balance, at instants and over steps
     /effects                  the active effects, and the reasons
     /timings, /provenance     outside of the content hash, because they depend on the machine
 

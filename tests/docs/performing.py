@@ -2,12 +2,14 @@
 performs them.
 
     ```python            executed, in order, in one namespace for the document; a ```text block
-    right after it is
-                         what it printed
+                         right after it is what it printed
     ```console           "$ " starts a command (iapb, cat, pytest); the lines after it are its
-    output ```yaml, ```python   whose first line is "# some/file.yaml" or "# some/file.py": that
-    file is written ```diff              first line "# some/file.py": lines with "+" are added to
-    that file beside its " " lines ```sh                only read: every `make` target must exist
+                         output
+    ```yaml, ```python   whose first line is "# some/file.yaml" or "# some/file.py": that file is
+                         written
+    ```diff              first line "# some/file.py": lines with "+" are added to that file beside
+                         its " " lines
+    ```sh                only read: every `make` target must exist
 
 The working directory is where files are written; for documents that add to the project it holds a
 copy of it.

@@ -11,7 +11,7 @@ import numpy as np
 
 from iapb import find_scene, load_scene
 from reference.worlds import run_world
-from reports.store import RunStore
+from reports.store import RunStore, write_run
 from reports.store.records import write_record
 from tests.reference.fclib_files import local_file, matrix_group
 
@@ -39,7 +39,8 @@ def open_store(folder):
 
 def put(folder, number=0):
     """Store the run of that number."""
-    return open_store(folder).put({"number": number}, numbered(number), "sample")
+    place = open_store(folder).place_of({"number": number}, "sample")
+    return write_run(place.path, numbered(number), key=place.key)
 
 
 @cache

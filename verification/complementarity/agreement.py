@@ -4,13 +4,13 @@ This module tests three exact statements on every case. Let Δ_eq = −(1+e) P u
 velocity in kinetic coordinates (u = Lᵀv, A = J L⁻ᵀ, P projects onto the row space of A) and let C =
 {Aᵀp : p >= 0}. If all contacts have the same e, then for *any* gamma_minus:
 
-1. The LCP's change is the projection of Δ_eq on the cone C (its QP is min |Aᵀp + (1+e)u|, and (I −
-   P)u is normal to C). So the laws agree if and only if some p >= 0 gives IAPB's velocity; their
-   distance is the distance of Δ_eq from C.
+1. The LCP's change is the projection of Δ_eq on the cone C (its QP is min |Aᵀp + (1+e)u|, and
+   (I − P)u is normal to C). So the laws agree if and only if some p >= 0 gives IAPB's velocity;
+   their distance is the distance of Δ_eq from C.
 2. Both changes are (1+e) times those of the plastic impact: whether the laws agree does not depend
-    on e.
-3. IAPB never keeps more energy than the LCP: loss_eq − loss_LCP = ½ (1−e)/(1+e) · distance². At e =
-   1 neither loses energy.
+   on e.
+3. IAPB never keeps more energy than the LCP: loss_eq − loss_LCP = ½ (1−e)/(1+e) · distance². At
+   e = 1 neither loses energy.
 
 Let two contacts have unit rows with the cosine c in the kinetic metric and approach at speeds 1 and
 r <= 1. Both impulses of IAPB push if and only if r >= c, because W⁻¹ (1, r) is proportional to (1 −

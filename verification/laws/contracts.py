@@ -5,22 +5,19 @@ keeps.
 `LAWS`. In the other two contracts, contacts only push. With u = Lᵀv, A = J L⁻ᵀ, γ = J v and Δu = u⁺
 − u⁻ = Aᵀp:
 
-============ ============================================================
-============================================= contract     the law of a textbook
-source ============ ============================================================
-============================================= unilateral   0 ≤ p ⟂ γ⁺ + e γ⁻ ≥ 0 (Newton, Moreau)
-Moreau 1988; Glocker and Pfeiffer 1995 unilateral   0 ≤ p_c ⟂ γ_c ≥ 0, then 0 ≤ p − (1 + e) p_c ⟂ γ⁺
-≥ 0         Poisson: Anitescu and Potra 1997 frictional   K ∋ p ⟂ w + μ|w_t| n ∈ K*, w = γ⁺ + e γ⁻
-on the normals      Coulomb: Moreau 1988; de Saxcé and Feng 1998 ============
-============================================================
-=============================================
+- ``unilateral``, Newton and Moreau: 0 ≤ p ⟂ γ⁺ + e γ⁻ ≥ 0 (Moreau 1988; Glocker and Pfeiffer
+  1995);
+- ``unilateral``, Poisson: 0 ≤ p_c ⟂ γ_c ≥ 0, then 0 ≤ p − (1 + e) p_c ⟂ γ⁺ ≥ 0 (Anitescu and Potra
+  1997);
+- ``frictional``, Coulomb: K ∋ p ⟂ w + μ|w_t| n ∈ K*, with w = γ⁺ + e γ⁻ on the normals (Moreau
+  1988; de Saxcé and Feng 1998).
 
 If every contact approaches and e is one number, Newton's and Poisson's laws have the same v⁺: p =
 (1 + e) p_c solves both, and v⁺ is unique. If only some contacts approach, the two laws differ, and
 v⁺ must satisfy one of them. Both kinds of resolver therefore keep all of UNILATERAL_LAWS. For a
 resolver with another law of restitution (sequential contacts, an energetic coefficient) choose the
-laws with ``laws=``: all laws except `OF_RESTITUTION` and those that compare calls hold for any
-contacts that only push.
+laws with ``laws=``: all laws hold for any contacts that only push, except ``restitution``,
+``complementarity``, ``mixed_restitution``, ``elastic``, and those that compare calls.
 
 Coulomb's law with e > 0 may gain energy (Kane and Levinson 1985); ``kinetic_energy`` detects this
 gain. The laws for tangents use e = 0, for which all forms of Coulomb's law agree; they check one
@@ -397,7 +394,6 @@ def no_gain_in_real_arithmetic(case: ImpactCase, resolver: Resolver, bounds: Bou
 
 # A resolver may promise no gain at all, not even in the last bit.
 EXACT_LAWS = {"exact_energy": Law("KE⁺ ≤ KE⁻ in real arithmetic", no_gain_in_real_arithmetic)}
-OF_RESTITUTION = ("restitution", "complementarity", "mixed_restitution", "elastic")
 
 
 class Contract(NamedTuple):

@@ -7,8 +7,8 @@ outcomes conserve energy and momentum. The paper's per-body rows (13)-(14) conse
 momentum (erratum 3).
 
     cradle     n balls in a line: the first arrives with v = 1 m/s, the others rest and touch
-    Bernoulli  a ball arrives along x between two touching balls, whose centres are at ±30° from its
-    path
+    Bernoulli  a ball arrives along x between two touching balls, whose centres are at ±30°
+               from its path
 """
 
 from __future__ import annotations

@@ -4,11 +4,12 @@ kernels on its own.
 A statement starts with its name at the margin. Each entry is indented by two or four spaces and
 starts with a keyword; what is indented further continues it. Keywords:
 
-title, source, says       prose, with LaTeX between dollar signs; so are remark, assumed and
-measured letters  M N: d d, v: d, e    matrices with their sizes, vectors, scalars (without sizes)
+title, source, says       prose, with LaTeX between dollar signs; so are remark, assumed, measured
+letters  M N: d d, v: d, e    matrices with their sizes, vectors, scalars (without sizes)
 let      W = J N Jᵀ; ...  abbreviations
-case     M=1 e=0          exact values for which all hypotheses hold (the witness); `case NAME: ...`
-has a name where    the definition of a letter; it assumes nothing
+case     M=1 e=0          exact values for which all hypotheses hold (the witness);
+                          `case NAME: ...` has a name
+where    the definition of a letter; it assumes nothing
 given    a hypothesis (several, separated by semicolons, if they state one property)
 use      takes over the entries of another statement
 lemma    a step of the proof; show: one that is a conclusion

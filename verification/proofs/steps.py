@@ -1,9 +1,9 @@
 """The permitted proof steps. The kernel searches a certificate by rewriting, then checks it by
 expansion alone.
 
-sum        claim.lhs − claim.rhs = sum of non-negative terms + sum of  left * (equation.lhs −
-equation.rhs) * right;
-           an equation has no such terms
+sum        claim.lhs − claim.rhs = sum of non-negative terms
+           + sum of  left * (equation.lhs − equation.rhs) * right;
+           an equation has no non-negative terms
 cancel     N = 0, since N' X N = 0 (or ≤ 0) with X positive definite (or without an X)
 divide     N = 0, since s N = 0 and the scalar s is not 0
 dominate   x ≥ 0, since q x − x² ≥ 0 and q ≥ 0 (scalars)

@@ -1,9 +1,9 @@
 """A mass that a hand pushes against a sampled wall: exact motion between the samples, many walls at
 once.
 
-    m ẍ = F_h − F_k − b ẋ      x > 0 inside the wall; F_k held from sample k to k + 1 (integrated
-    exactly)
+    m ẍ = F_h − F_k − b ẋ
 
+x > 0 is inside the wall; F_k is held from sample k to k + 1 (integrated exactly).
 The wall gets quantised and delayed readings of the position; their difference over one step is the
 velocity. Under the law "penalty" its force is (5), clamped. Under "impulses" the first reading
 inside the wall causes the impulse (20), p = (1 + e) m γ⁻, applied as the force p/T over one step;

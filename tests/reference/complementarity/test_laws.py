@@ -19,7 +19,6 @@ from reference.exact import bulk_energy_gain
 from reference.rigid_step import STEP_SOLVERS, nearest_velocity
 
 BAR = np.diag([1.0, 1.0 / 12.0])  # a bar struck at x = 0.5 and 0.4 (design of the counterexample)
-BAR_ROWS = np.array([[1.0, 0.5], [1.0, 0.4]])
 
 
 def random_problem(seed: int, contacts: int, e: object) -> ImpactProblem:

@@ -35,10 +35,6 @@ def returns_too_much(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
     return np.array([float(a + TOO_MUCH * (b - a)) for a, b in zip(before, exact, strict=True)])
 
 
-def gives_up(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    raise RuntimeError("did not converge")
-
-
 def makes_stale_jacobian() -> Resolver:
     """Returns a resolver that reuses the Jacobian of the first call with each shape."""
     remembered: dict[tuple[int, ...], Floats] = {}

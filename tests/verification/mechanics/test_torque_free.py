@@ -11,7 +11,7 @@ from iapb.mechanics.mechanism import Mechanism
 from iapb.scene import find_scene, load_scene
 from iapb.scene.mechanism import mechanism_of
 from iapb.simulation import simulate
-from verification.mechanics.torque_free import TorqueFreeBody
+from tests.reference.torque_free import TorqueFreeBody
 
 H = 1e-4  # [s] of central differences: their error is about H^2
 # A gentle wobble, and a rotation close to the unstable middle axis, in which the body flips

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from math import sqrt
 
 import numpy as np
+from scipy.special import ellipj, ellipk
 
 from reference import Floats
 
@@ -57,15 +58,11 @@ class TorqueFreeBody:
     @property
     def period(self) -> float:
         """Time [s] after which the rates repeat."""
-        from scipy.special import ellipk
-
         speed, parameter = self.speed_and_parameter
         return float(4.0 * ellipk(parameter) / speed)
 
     def rates(self, time: Floats | float) -> Floats:
         """Angular velocity (..., 3) [rad/s] in body axes."""
-        from scipy.special import ellipj
-
         i1, i2, i3 = self.moments
         speed, parameter = self.speed_and_parameter
         sn, cn, dn, _ = ellipj(speed * np.asarray(time), parameter)
