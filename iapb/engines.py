@@ -75,11 +75,7 @@ def fields_of_our_engine(scene: Scene) -> tuple[str, ...]:
     A device counts where a hand holds the tool through it, contact forces where something can
     touch.
     """
-    gains = scene.couplings
-    coupled = scene.hand is not None and (
-        gains.four_channel is not None or gains.unilateral is not None
-    )
-    found = ["couplings", *["device"] * (scene.device is not None)] if coupled else []
+    found = ["couplings", *["device"] * (scene.device is not None)] if scene.is_coupled else []
     if any(body.shapes for body in scene.bodies):
         found += ["contact.forces"] * (scene.contact.forces == "paper")
         found += [

@@ -32,9 +32,7 @@ class World(NamedTuple):
     def coupling_in(self, scene: Scene) -> Coupling:
         """Return the coupling with the scene's gains, or no coupling if the scene has no hand or no
         gains."""
-        gains = scene.couplings
-        without = scene.hand is None or (gains.four_channel is None and gains.unilateral is None)
-        return coupling_of(scene, "none" if without else self.coupling)
+        return coupling_of(scene, self.coupling if scene.is_coupled else "none")
 
 
 def _augmented(name: str, **settings: Any) -> Callable[[str], World]:

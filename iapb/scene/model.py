@@ -353,6 +353,13 @@ class Scene(ScenePart):
         return max(part.friction for part in parts if part.friction is not None)
 
     @property
+    def is_coupled(self) -> bool:
+        """Whether the hand holds the tool through a device, coupled by gains that the scene
+        gives."""
+        gains = self.couplings
+        return self.hand is not None and bool(gains.four_channel or gains.unilateral)
+
+    @property
     def chosen_fields(self) -> tuple[str, ...]:
         """Contact fields that the toolkit chooses, since the scene gives no value for them."""
         fields = () if self.contact.forces == "paper" else ("stiffness", "damping")
