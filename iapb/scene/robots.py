@@ -44,7 +44,7 @@ class Robot(ScenePart):
         False, description="true: the root link moves freely; default: fixed to the world"
     )
     shapes: dict[str, tuple[SpatialShape, ...]] = Field(
-        default_factory=dict, description="what can touch, by link; link axes; [] for nothing"
+        default_factory=dict, description="what can touch, by link; link axes; default: nothing"
     )
     position: dict[str, tuple[Number, ...]] = Field(
         default_factory=dict,
