@@ -103,26 +103,32 @@ def watch(simulation: Simulation, world: str, seconds: float, page: Any, clock: 
     interrupted = Event()  # so that Ctrl-C ends the loop between two ticks, and every step is whole
     before = signal.signal(signal.SIGINT, lambda *_: interrupted.set())
     due = clock.monotonic()
-    while stop is None and recorder.steps < total and page.is_open() and not interrupted.is_set():
-        steps = min(most, total - recorder.steps)
-        try:
-            was_pulled = was_pulled or page.pull is not None
-            if was_pulled:
-                own = wrench_of(simulation.scene, simulation.time + 0.5 * steps * dt)
-                pull = page.pull  # may change meanwhile
-                simulation.hold(own + spring(simulation, pull, own) if pull is not None else own)
-            stop = recorder.chunk(total, steps)
-        except IapbError as error:
-            stop = error
-        page.show(mechanism.poses(simulation.state.q[None], planar=False)[0])
-        due += steps * dt
-        behind = clock.monotonic() - due
-        if behind > 0.0:
-            late += steps
-            latest = max(latest, behind)
-            due += behind
-        clock.sleep(max(0.0, -behind))
-    signal.signal(signal.SIGINT, before)
+    try:
+        while (
+            stop is None and recorder.steps < total and page.is_open() and not interrupted.is_set()
+        ):
+            steps = min(most, total - recorder.steps)
+            try:
+                was_pulled = was_pulled or page.pull is not None
+                if was_pulled:
+                    own = wrench_of(simulation.scene, simulation.time + 0.5 * steps * dt)
+                    pull = page.pull  # may change meanwhile
+                    simulation.hold(
+                        own + spring(simulation, pull, own) if pull is not None else own
+                    )
+                stop = recorder.chunk(total, steps)
+            except IapbError as error:
+                stop = error
+            page.show(mechanism.poses(simulation.state.q[None], planar=False)[0])
+            due += steps * dt
+            behind = clock.monotonic() - due
+            if behind > 0.0:
+                late += steps
+                latest = max(latest, behind)
+                due += behind
+            clock.sleep(max(0.0, -behind))
+    finally:
+        signal.signal(signal.SIGINT, before)
     if recorder.steps == 0 and stop is not None:
         raise stop
     run = recorder.run(world, "" if stop is None else str(stop))
