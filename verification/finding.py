@@ -76,6 +76,8 @@ FAILED_CASES = "not computed"  # name of the table of cases that failed
 class Part:
     """A part of the answer, judged separately.
 
+    Attributes
+    ----------
     name : distinguishes the parts of one question; sentence : the result, with its number
     held, decided : trials in which the claim held, and trials that had an outcome; unknown : trials
         without one
@@ -157,6 +159,8 @@ class Failure:
 class Finding:
     """The result of a study.
 
+    Attributes
+    ----------
     key : name of the question, such as "C07" or "mechanics"; title : heading of the question
     question : the question and the method; answer : the result, in one sentence with its number
     verdict : one of VERDICTS; parts : the parts that give the verdict

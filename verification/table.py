@@ -20,6 +20,8 @@ _LISTED = 8  # if there are more values, only the smallest and largest are print
 class Column:
     """One quantity of every row.
 
+    Attributes
+    ----------
     key : name of the column, in code and in print; unit : empty if there is none
     condition : True if the study chooses the value, False if it measures it
     part : True if the rows with the same value form one part, which is judged separately
@@ -47,6 +49,8 @@ class Column:
 class Table:
     """Rows of numbers, texts or None ("does not apply"), and the description of each column.
 
+    Attributes
+    ----------
     holds : whether the claim holds, one entry per row; None if the row cannot decide; empty if
         nothing is judged
     digits : significant digits in print; note : text printed below the table

@@ -65,10 +65,10 @@ class Impact(NamedTuple):
         v⁻ and the returned v⁺. With the clamp on, the upper bound is never above 0.
     clamp : factor in [0, 1] by which the final energy clamp scaled the change of velocity; 1 =
         inactive.
-    status : ``"complete"``; ``"budget"``: the row budget stopped the method early; ``"not
-        solved"``: a contact still closes after Poisson's law by more than 1e-6 of the largest |J
-        v⁻|, which nearly opposed rows and κ(M) from 1e10 can cause (the energy does not rise in
-        this case either); ``"reduced"``: no p_t that obeys Coulomb's law was found (there may be
+    status : ``"complete"``; ``"budget"``: the row budget stopped the method early;
+        ``"not solved"``: a contact still closes after Poisson's law by more than 1e-6 of the
+        largest |J v⁻|, which nearly opposed rows and κ(M) from 1e10 can cause (the energy does not
+        rise in this case either); ``"reduced"``: no p_t that obeys Coulomb's law was found (there may be
         none). p_t then maximizes the dissipation within the friction limits of the frictionless
         impact. It stays in the friction cones, and passivity and restitution still hold.
         ``"cancelled"``: no change of velocity without an energy gain was found, so v⁺ = v⁻, or the

@@ -82,6 +82,8 @@ class Figure:
     """A figure. `number` is its number in the paper ("Figure 7"), or empty for a figure of this
     project.
 
+    Attributes
+    ----------
     inputs : names of the runs and tables it was drawn from; missing : those that it lacks, so that
         it has no panels
     said : what the paper says, what we find, what is the same, what differs; claims : the claims

@@ -5,19 +5,16 @@ A step applies forces and impulses at its start (the kick); free motion then mov
 
 STRAIGHT  M is constant and B = 0, such as a body in the plane or a slide: q moves with v.
 RIGID     one rigid body that turns freely or about a fixed point. Its angular momentum l in body
-axes turns against the
-          body, so R l is constant. With the principal moments I_1 <= I_2 <= I_3 the energy
-          |l|²/2I_2 turns the body about l, exactly; the rest, ½(1/I_1 − 1/I_2) l_1² + ½(1/I_3 −
-          1/I_2) l_3², is split into turns about the axes
-          1, 3, 1 (Dullweber, Leimkuhler and McLachlan, J. Chem. Phys. 107, 1997), three times with
-          the steps of Yoshida (Phys. Lett. A 150, 1990). The motion is exact for a ball and for a
-          body with two equal moments, and of fourth order otherwise. The centre of mass moves
-          straight.
+          axes turns against the body, so R l is constant. With the principal moments I_1 <= I_2 <=
+          I_3 the energy |l|²/2I_2 turns the body about l, exactly; the rest, ½(1/I_1 − 1/I_2) l_1²
+          + ½(1/I_3 − 1/I_2) l_3², is split into turns about the axes 1, 3, 1 (Dullweber, Leimkuhler
+          and McLachlan, J. Chem. Phys. 107, 1997), three times with the steps of Yoshida (Phys.
+          Lett. A 150, 1990). The motion is exact for a ball and for a body with two equal moments,
+          and of fourth order otherwise. The centre of mass moves straight.
 LINKAGE   velocity Verlet: q moves with v + Δt a/2, and v changes by the mean of a = −M⁻¹B at both
-ends. The velocity of
-          a root that moves freely then follows from the conserved momentum, its position from the
-          straight path of the centre of mass, and the rates of the joints are scaled so that the
-          kinetic energy is that before. Second order.
+          ends. The velocity of a root that moves freely then follows from the conserved momentum,
+          its position from the straight path of the centre of mass, and the rates of the joints are
+          scaled so that the kinetic energy is that before. Second order.
 """
 
 from __future__ import annotations
