@@ -106,9 +106,7 @@ class Stage:
             self.path = incomplete
         provenance = collect_provenance() | {"sources": evidence_version()}
         content = {"runs": list(used.values()), "records": records}
-        write_record(
-            self.path, content, f"Records of the stage {self.name}", provenance, tuple(used)
-        )
+        write_record(self.path, content, provenance)
         self.records, self.runs = found, dict(used)
 
     def _checked(self, records: Any) -> Any:

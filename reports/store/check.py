@@ -1,4 +1,5 @@
-"""Check result files: read each completely, and compare it with its seal and its content hash."""
+"""Check result files: read each completely, and compare it with its seal, a run also with its
+content hash."""
 
 from __future__ import annotations
 
@@ -33,8 +34,8 @@ class FileState:
 
 
 def check_store(folder: Path | str, progress: Progress | None = None) -> tuple[FileState, ...]:
-    """Read every result file below a folder (or a single file) completely, and check its seal and
-    hashes.
+    """Read every result file below a folder (or a single file) completely, and check its seal; the
+    content hash too, if it is a run.
 
     `progress` is called as progress(files read, total files).
     """

@@ -3,32 +3,26 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from reference.hdf5 import Budget, values_at
 from reports.store import io
-from reports.store.keys import hash_of, plain
+from reports.store.keys import plain
 from reports.store.schema import FORMAT_VERSION, TABLE_FORMAT
 
 RECORDS = "records"
 
 
-def write_record(
-    path: Path, value: Any, title: str, provenance: Mapping[str, str], runs: Sequence[str] = ()
-) -> Path:
-    """Write any records as JSON; see `plain` for the types, `runs` are the files behind the
-    records."""
+def write_record(path: Path, value: Any, provenance: Mapping[str, str]) -> Path:
+    """Write any records as JSON; see `plain` for the types."""
     with io.new_file(path, replace=True) as file:
         file.attrs.update({"format": TABLE_FORMAT, "format_version": FORMAT_VERSION})
         for name, fact in provenance.items():
             io.write_text(file.require_group("provenance"), name, fact)
-        group = file.create_group(RECORDS)
-        group.attrs.update({"title": title, "command": "iapb reproduce", "runs": "\n".join(runs)})
         text = json.dumps(plain(value), ensure_ascii=False)
-        io.write_text(group, "json", text)
-        file.attrs["content_hash"] = hash_of(text)
+        io.write_text(file.create_group(RECORDS), "json", text)
     return path
 
 

@@ -80,7 +80,7 @@ def test_every_kind_of_file_is_told_and_a_damaged_run_is_computed_again_where_it
 
 @pytest.mark.parametrize("version", [FORMAT_VERSION - 1, FORMAT_VERSION + 1])
 def test_what_another_version_wrote_is_told(filled, version, capsys):
-    others = [runs(filled)[0], write_record(filled / "runs" / "table.h5", 1, "t", {})]
+    others = [runs(filled)[0], write_record(filled / "runs" / "table.h5", 1, {})]
     for path in others:
         with h5py.File(path, "r+") as file:
             file.attrs["format_version"] = version
@@ -111,7 +111,7 @@ def test_again_tells_what_differs_and_goes_on_past_what_cannot_be_made_again(fil
     assert [one.name for one in repeat_run(path).differs] == ["trajectory/q", "energy/impact_loss"]
     assert all(0.0 < one.largest < 2e-15 for one in repeat_run(path).differs)
     write_run(filled / "mine.h5", replace(run, law="mine"))
-    write_record(filled / "table.h5", 1, "t", {})
+    write_record(filled / "table.h5", 1, {})
     assert store("again", filled) == 1
     said = capsys.readouterr().out
     assert "forged.h5: differs in\n" in said and "energy/impact_loss: by at most 6e-17 in " in said

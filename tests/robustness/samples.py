@@ -48,7 +48,7 @@ def result_files():
     """A short run, and a table."""
     with tempfile.TemporaryDirectory() as folder:
         run, table = put(Path(folder)), Path(folder) / "table.h5"
-        write_record(table, [[0.5, "a"], [1.5, "b"]], "sample", {})
+        write_record(table, [[0.5, "a"], [1.5, "b"]], {})
         return {"run.h5": run.read_bytes(), "table.h5": table.read_bytes()}
 
 
