@@ -221,15 +221,13 @@ def moved(axis: int = 0, body: int = 0) -> Quantity:
     return lambda motion: motion.place[-1, body, axis] - motion.place[0, body, axis]
 
 
-def farthest(size: float, bodies: slice = slice(None)) -> Quantity:
+def farthest(size: float) -> Quantity:
     """The largest displacement of a body's origin, or of points at `size` from it, at any time
     [m]."""
 
     def measured(motion: Motion) -> float:
-        slid = np.linalg.norm(motion.place[:, bodies] - motion.place[:1, bodies], axis=-1)
-        turned = np.linalg.norm(
-            motion.turn[:, bodies] - motion.turn[:1, bodies], axis=(-2, -1)
-        ) / math.sqrt(2.0)
+        slid = np.linalg.norm(motion.place - motion.place[:1], axis=-1)
+        turned = np.linalg.norm(motion.turn - motion.turn[:1], axis=(-2, -1)) / math.sqrt(2.0)
         return float((slid + size * turned).max())
 
     return measured
