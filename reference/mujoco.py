@@ -31,7 +31,6 @@ from importlib.metadata import version
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from iapb.contact import geometry
 from iapb.contact.geometry import Shapes
@@ -236,6 +235,11 @@ def damping_ratio_of(restitution: float) -> float:
 # The model
 
 
+def _rotation(quaternions: Floats) -> Any:
+    """Return the rotations of quaternions (..., 4) in the order x, y, z, w."""
+    return needed("scipy.spatial.transform", "A reference").Rotation.from_quat(quaternions)
+
+
 def _quaternion(rotation: Floats) -> Floats:
     """Return MuJoCo's quaternion w, x, y, z of a rotation matrix."""
     quaternion = np.empty(4)
@@ -357,7 +361,7 @@ def set_state(places: list[JointPlace], data: Any, q: Floats, v: Floats) -> None
         elif place.kind in TURNING:
             turn = coordinates[-4:]
             if place.kind == "free_flyer":
-                linear = Rotation.from_quat(turn).apply(velocities[:3])
+                linear = _rotation(turn).apply(velocities[:3])
                 velocities = np.concatenate([linear, velocities[3:]])
             coordinates = np.concatenate([coordinates[:-4], turn[3:], turn[:3]])
         data.qpos[place.qpos : place.qpos + len(coordinates)] = coordinates
@@ -378,7 +382,7 @@ def states_of(places: list[JointPlace], qpos: Floats, qvel: Floats) -> tuple[Flo
             turn = np.roll(coordinates[:, -4:], -1, axis=1)
             q.append(np.hstack([coordinates[:, :-4], turn]))
             if place.kind == "free_flyer":
-                linear = Rotation.from_quat(turn).inv().apply(velocities[:, :3])
+                linear = _rotation(turn).inv().apply(velocities[:, :3])
                 velocities = np.hstack([linear, velocities[:, 3:]])
         else:
             q.append(qpos[:, place.qpos : place.qpos + kind.nq])

@@ -585,10 +585,10 @@ def effect_costs(numbers: Table) -> Drawn:
         with Plot(f"effect-costs-{scene}", size, shape=(1, 2)) as plot:
             for axes, key, title in zip(plot.each, ("time saved", "error"), _COSTS, strict=True):
                 for place, row in zip(places, rows, strict=True):
-                    look = line_arguments(_BEST if row["best of its error"] == "yes" else _WORSE)
-                    axes.plot(
-                        max(row[key], _NOTHING) if key == "error" else row[key], place, **look
-                    )
+                    style = _BEST if row["best of its error"] == "yes" else _WORSE
+                    look = line_arguments(style) | {"linestyle": "none"}
+                    value = max(row[key], _NOTHING) if key == "error" else row[key]
+                    axes.plot(value, place, **look)
                 axes.set(xlabel=title, ylim=(-0.6, len(rows) - 0.4))
                 axes.set_yticks(places, [])
             plot.axes.set_yticks(places, [row["effect"].replace("_", " ") for row in rows])

@@ -178,7 +178,9 @@ def _last_ball(numbers: Table) -> str:
         for (treatment, rows), found in series.items():
             look, values = found[0].look, [outcome.velocity[-1][0] for outcome in found]
             words = rows.removesuffix(" contacts").removesuffix(" along the row")
-            mine = replace(look, name="per-body rows" if "per-body" in treatment else words)
+            name = "per-body rows" if "per-body" in treatment else words
+            mine = replace(look, name=name, filled=name != "approaching")
+            plot.words[name] = ""
             plot.curve(zip([len(outcome.velocity) for outcome in found], values, strict=True), mine)
         plot.axes.set(
             xlabel="balls in the cradle",

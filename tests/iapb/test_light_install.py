@@ -71,9 +71,9 @@ NEEDS = [
     ("from iapb.__main__ import main; print(main())", "iapb: The command", "typer"),
 ]
 COMMANDS = {
-    "inspect run.h5": ("h5py", "reference"),
-    "verify": ("hypothesis", "verify"),
-    "reproduce": ("jinja2", "report"),
+    "inspect run.h5": ("h5py", "reference", "The command"),
+    "verify": ("hypothesis", "verify", "verification.check_passivity"),
+    "reproduce": ("jinja2", "report", "The command"),
 }
 
 
@@ -95,12 +95,12 @@ for code in {[code for code, *_ in NEEDS]!r}:
 
 @pytest.mark.parametrize("line", COMMANDS)
 def test_a_command_without_its_extra_ends_before_it_computes_and_names_it(line: str) -> None:
-    package, extra = COMMANDS[line]
+    package, extra, who = COMMANDS[line]
     done = run_without(
         {package}, f"from reports.cli import main; raise SystemExit(main({line.split()!r}))"
     )
     assert done.returncode == 1 and done.stdout == "", done
-    assert done.stderr == "iapb: " + TOLD.format("The command", package, extra) + "\n"
+    assert done.stderr == "iapb: " + TOLD.format(who, package, extra) + "\n"
 
 
 @pytest.mark.parametrize(("name", "own"), [("reference", "{}/__init__.py"), ("reports", "{}.py")])
