@@ -78,6 +78,8 @@ def fields_of_our_engine(scene: Scene) -> tuple[str, ...]:
     found = ["couplings", *["device"] * (scene.device is not None)] if scene.is_coupled else []
     if any(body.shapes for body in scene.bodies):
         found += ["contact.forces"] * (scene.contact.forces == "paper")
+        per_body = scene.contact.self_collision_rows == "per_body"
+        found += ["contact.self_collision_rows"] * per_body
         found += [
             f"contact.{name}"
             for name in ("stiffness", "damping")
