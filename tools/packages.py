@@ -49,7 +49,7 @@ def main() -> int:
     """Build, test each environment and print a table; return 1 if one fails or gives different
     numbers."""
     parser = argparse.ArgumentParser(
-        prog="python -m tools.packages", description=__doc__.splitlines()[0]
+        prog="python -m tools.packages", description=__doc__.partition("\n\n")[0]
     )
     parser.add_argument("--extra", default="", help="an extra of pyproject.toml to install, too")
     parser.add_argument(

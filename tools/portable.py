@@ -81,7 +81,7 @@ def main() -> int:
     """Run all settings, print and write the table; return 1 if a setting gives different
     results."""
     parser = argparse.ArgumentParser(
-        prog="python -m tools.portable", description=__doc__.splitlines()[0]
+        prog="python -m tools.portable", description=__doc__.partition("\n\n")[0]
     )
     parser.add_argument(
         "--settings",
