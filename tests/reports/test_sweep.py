@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -120,7 +121,9 @@ def test_a_damaged_or_impossible_point_costs_its_own_row(done, tmp_path, capsys)
 def test_a_killed_sweep_keeps_its_finished_points_and_continues(done, tmp_path, kill):
     (tmp_path / "small.yaml").write_text(STUDY)
     command = [sys.executable, "-m", "iapb", "sweep", "small.yaml", "--workers", "1", "--out", "."]
-    child = subprocess.Popen(command, cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)})
+    heed = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)  # a job in the background does not
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    child = subprocess.Popen(command, cwd=tmp_path, env=environment, preexec_fn=heed)
     while not runs(tmp_path) and child.poll() is None:
         time.sleep(0.01)
     child.send_signal(kill)
