@@ -20,14 +20,15 @@ from verification.laws.worlds import any_scene
 from verification.table import Row, Table
 from verification.worlds import compare_worlds
 
-LONGEST = {"quick": 0.3, "full": 2.0}  # [s] simulated time of a scene
+MOST_STEPS = {"quick": 150, "full": 2000}  # simulated of a scene
+SPRINGS_ALONE = "box_stack"  # its boxes start as deep in each other as its own springs give way
 SAME = 1e-3  # [mm] a difference that does not count
 
 
 def _row(study: Study, name: str) -> Row:
     """Return how far both worlds are from rigid contact, and what they make of energy."""
     given = study.scene(name)
-    duration = min(given.duration, LONGEST[study.depth])
+    duration = min(given.duration, MOST_STEPS[study.depth] * given.step)
     scene = any_scene(given.resolved() | {"duration": duration})
     table = compare_worlds(scene, ["IAPB", "mujoco"], impacts=0).tables["worlds"]
     ours, theirs = (table.where(world=world).records()[0] for world in ("IAPB", "mujoco"))
@@ -39,6 +40,13 @@ def _row(study: Study, name: str) -> Row:
         "IAPB above start and work [J]": ours["most above start and work"],
         "MuJoCo above start and work [J]": theirs["most above start and work"],
     }
+
+
+def _scenes(study: Study) -> list[str]:
+    """Return the names of the scenes; none if MuJoCo is not installed."""
+    if find_spec("mujoco") is None:
+        return []
+    return [name for name in scene_names() if name != SPRINGS_ALONE]
 
 
 def _is_as_near(row: Row) -> bool:
@@ -61,7 +69,7 @@ def _answer(tables: Mapping[str, Table], parts: Sequence[Part]) -> str:
 SCENES = Check(
     key="scenes",
     question="IAPB is at least as near to rigid contact as MuJoCo.",
-    cases=lambda study: scene_names() if find_spec("mujoco") else (),
+    cases=_scenes,
     row=_row,
     holds=_is_as_near,
     rule=verdict_of_trials,
@@ -69,7 +77,8 @@ SCENES = Check(
     note="Apart: distance from the ideal world, in a scene with friction from ideal-friction; root mean square over "
     "mass and time. Above start and work: the largest rise of kinetic plus potential energy above "
     "the start and the "
-    "work of the hand.",
+    "work of the hand. The scene box_stack is left out: its boxes start inside each other, where "
+    "its own springs balance them.",
 )
 engines = Topic(
     key="engines",
