@@ -21,7 +21,9 @@ from verification.table import Row, Table
 from verification.worlds import compare_worlds
 
 MOST_STEPS = {"quick": 150, "full": 2000}  # simulated of a scene
-SPRINGS_ALONE = "box_stack"  # its boxes start as deep in each other as its own springs give way
+# The boxes of the first start as deep in each other as its own springs give way; a step of rigid
+# contact with friction takes seconds in the second.
+LEFT_OUT = ("box_stack", "peg_hole_space")
 SAME = 1e-3  # [mm] a difference that does not count
 
 
@@ -46,7 +48,7 @@ def _scenes(study: Study) -> list[str]:
     """Return the names of the scenes; none if MuJoCo is not installed."""
     if find_spec("mujoco") is None:
         return []
-    return [name for name in scene_names() if name != SPRINGS_ALONE]
+    return [name for name in scene_names() if name not in LEFT_OUT]
 
 
 def _is_as_near(row: Row) -> bool:
@@ -77,8 +79,8 @@ SCENES = Check(
     note="Apart: distance from the ideal world, in a scene with friction from ideal-friction; root mean square over "
     "mass and time. Above start and work: the largest rise of kinetic plus potential energy above "
     "the start and the "
-    "work of the hand. The scene box_stack is left out: its boxes start inside each other, where "
-    "its own springs balance them.",
+    "work of the hand. Two scenes are left out: the boxes of box_stack start inside each other, "
+    "where its own springs balance them, and rigid contact is too slow in peg_hole_space.",
 )
 engines = Topic(
     key="engines",
