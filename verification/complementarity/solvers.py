@@ -257,7 +257,7 @@ HARD = (
     "bar_with_unequal_restitution",
 )
 HYPERSTATIC_CONTACTS = (8, 24, 64)
-SCENES = ("peg_corner", "peg_hole_space", "three_link_arm_elastic", "arm_obstacles")
+SCENES = ("peg_corner", "peg_room", "three_link_arm_elastic", "arm_obstacles")
 FAMILIES = ("face on floor", "corner", "tight hole", "random rows")
 FRICTIONS = (0.1, 0.5, 1.0)
 FRICTIONAL_CONTACTS = (1, 4, 12)

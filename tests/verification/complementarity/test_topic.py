@@ -14,7 +14,8 @@ from tests.reference.fclib_files import local_file
 from verification.check import Study
 from verification.complementarity import extensions
 from verification.complementarity.extensions import FRICTION, UNEQUAL
-from verification.complementarity.solvers import FACTORS, collections, study_read
+from verification.complementarity.of_runs import scene_impacts
+from verification.complementarity.solvers import FACTORS, SCENES, collections, study_read
 from verification.complementarity.topic import REFERENCES
 from verification.cost import solvers as timings
 from verification.cost.calls import PRINTED
@@ -43,6 +44,11 @@ def test_unequal_restitution_is_poissons_law_and_never_gains() -> None:
     assert (
         approaching["Newton LCP"] <= 1e-12 < mixed["Newton LCP"] and approaching["equalities"] > 0.1
     )
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_each_scene_of_our_own_problems_has_an_impact_without_friction(name: str) -> None:
+    assert scene_impacts(name)
 
 
 def test_the_references_are_compared_scene_by_scene() -> None:
