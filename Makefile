@@ -37,7 +37,8 @@ $(LOCK_STAMP):
 	@touch $@
 
 $(PROJECT_STAMP): $(LOCK_STAMP)
-	@$(PIP) install --no-deps --no-build-isolation --editable .
+	@echo "Compiling the engine, about a minute ..."
+	@$(PIP) install --no-deps --no-build-isolation --editable . && echo "Done after $$SECONDS s."
 	@rm -f $(VENV)/.project-*
 	@touch $@
 

@@ -45,7 +45,6 @@ device = Handle()
 coupling = FourChannel(stiffness=(100.0,), damping=(70.0,))
 law = ImpulseAugmented(rendering="saturate")  # no impulse beyond what the motor can
 simulation = Simulation(scene, law, coupling, device)
-simulation.prepare()  # compiles, so that no step has to
 device.switched_on = due = time.monotonic()
 try:
     for _ in range(round(0.5 / simulation.system.dt)):

@@ -5,6 +5,8 @@ from __future__ import annotations
 import copyreg
 import pickle
 import re
+import sys
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,6 +28,13 @@ def shown(value: Any) -> str:
 _ORDERS = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff]"
 )
+
+
+def to_stderr(line: str) -> None:
+    """Write a line to stderr now, if it can be written; what would give a terminal orders is
+    escaped."""
+    with suppress(OSError):
+        print(harmless(line), file=sys.stderr, flush=True)
 
 
 def harmless(text: str) -> str:
@@ -135,6 +144,7 @@ EXTRAS = {
             "proxsuite",
             "quantecon",
             "mujoco",
+            "numba",
         ),
         "reference",
     ),

@@ -26,58 +26,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from iapb.compiled import Entry, copy_into, kernel
-from iapb.compiling import compiling_told, to_stderr
 from iapb.contact.impact import real_numbers
-from iapb.contact.kernels.step import STATUS_TEXT, advance
 from iapb.contact.laws import ContactLaw, ImpulseAugmented, Penalty, StepResult, copied_step
 from iapb.engines import Engine, is_engine
 from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import Coupling, NoCoupling
 from iapb.haptics.device import Device, DeviceLink
-from iapb.haptics.rendering import NO_COUPLING, couple, move_device, render
-from iapb.recording import Recorder, make_record, write_step
+from iapb.loop import (
+    ADVANCE,
+    COUPLE,
+    FAILURES,
+    MOVE,
+    RENDER,
+    WHOLE,
+    WRITE,
+    make_record,
+    run_steps,
+)
+from iapb.recording import Recorder
 from iapb.run import COLLIDING, FREE, INTERRUPTED, RESTING, Run
 from iapb.scene import Scene, find_scene, load_scene
 from iapb.scene.mechanism import wrench_of
 from iapb.system import System, system_of
 from iapb.worlds import find_world
-
-DEVICE_NOT_FINITE = 1 + max(STATUS_TEXT)
-FAILURES = STATUS_TEXT | {
-    DEVICE_NOT_FINITE: "the device's motion left the range of numbers: the step is too long "
-    "for this coupling and delay"
-}
-
-
-PULL, MOVE, WRITE, WHOLE = (
-    1,
-    2,
-    4,
-    7,
-)  # parts of a step; a single one costs no second compilation of the engine
-
-
-@kernel
-def compiled_steps(world, state, port, record, part, first, steps):  # type: ignore[no-untyped-def]
-    """Do `steps` steps of an engine law, or one part of a step; return the number of steps done and
-    the status."""
-    line = record.used[0]
-    for k in range(steps):
-        if part & PULL:
-            if part == WHOLE and port.planned.shape[0] > 0:
-                copy_into(port.wrench, port.planned[k])
-            couple(world, state, port)
-            status = advance(world, state, port.applied)
-            if status:
-                return k, status
-            render(world, state, port)
-        if part & MOVE and port.coupling != NO_COUPLING and not move_device(world, state, port):
-            return k, DEVICE_NOT_FINITE
-        if part & WRITE:
-            write_step(record, line + k, first + k, state, port)
-    return steps, 0
-
 
 _STEP_VECTORS = ("q", "v", "penalty_force", "friction_force", "impulse")
 
@@ -140,8 +111,6 @@ class Simulation:
         self.link = (
             None if device is None else DeviceLink(device, self.world, self.state, self.port)
         )
-        self._couple, self._render, self._move = Entry(couple), Entry(render), Entry(move_device)
-        self._write, self._steps = Entry(write_step), Entry(compiled_steps)
         self._planned = self.scene.hand is not None and self.scene.hand.changes
         self.steps_done = 0
 
@@ -169,30 +138,25 @@ class Simulation:
         """
         if hand_force is not None:
             self.hold(hand_force)
-        world, state, port = blocks = self.world, self.state, self.port
+        state, port = self.state, self.port
         if self._planned:
             port.wrench[:] = wrench_of(self.scene, (self.steps_done + 0.5) * self.system.dt)
+        moved = MOVE if self.link is None else 0
         if self.compiled:
-            self._do(PULL)
+            self._do(COUPLE | ADVANCE | RENDER | moved)
         else:
-            self._couple(*blocks)
+            self._do(COUPLE)
             self._take(self.law.advance(self.system, state, port.applied, self.system.dt))
-            self._render(*blocks)
+            self._do(RENDER | moved)
         if self.link is not None:
             self.link.exchange()
-        elif self.compiled:
-            self._do(MOVE)
-        elif self.port.coupling != NO_COUPLING and not self._move(
-            self.world, self.state, self.port
-        ):
-            raise IapbError(FAILURES[DEVICE_NOT_FINITE])
         self.steps_done += 1
         return copied_step(self.system, self.state)
 
-    def _do(self, part: int) -> None:
-        """Do one part of a compiled step."""
-        _, status = self._steps(
-            self.world, self.state, self.port, self._unwritten, part, self.steps_done, 1
+    def _do(self, parts: int) -> None:
+        """Do parts of one step."""
+        _, status = run_steps(
+            self.world, self.state, self.port, self._unwritten, parts, self.steps_done, 1
         )
         if status:
             raise IapbError(FAILURES[status])
@@ -243,35 +207,12 @@ class Simulation:
         tool = self.system.tool_tree
         state.state_of_tree[tool if tool >= 0 else slice(None)] = result.state
 
-    def prepare(self) -> None:
-        """Load or compile the machine code before the first step is timed."""
-        _, state, port = blocks = self.world, self.state, self.port
-        if self.compiled:
-            self._steps(*blocks, self._unwritten, WHOLE, self.steps_done, 0)
-            return
-        self._couple.taking(*blocks)
-        self._render.taking(*blocks)
-        self._write.taking(self._unwritten, 0, 0, state, port)
-        if self.link is None and port.coupling != NO_COUPLING:
-            self._move.taking(*blocks)
-        frozen = getattr(getattr(self.law, "__dataclass_params__", None), "frozen", False)
-        if (
-            frozen and self.link is None
-        ):  # a law in Python without a state of its own takes a first step, then undone
-            arrays = [*self.state.arrays(), *self.port.arrays()]
-            before = [array.copy() for array in arrays]
-            with suppress(IapbError):  # the first step will say so
-                self.step()
-            for array, values in zip(arrays, before, strict=True):
-                array[...] = values
-            self.steps_done = 0
-
     def advance_chunk(self, record: Any, steps: int) -> tuple[int, BaseException | None]:
         """Do and record up to `steps` steps; return the number done, and the exception that stopped
         them or None."""
         if self.compiled and self.link is None:
             planned, stop = self._plan(steps)
-            done, status = self._steps(
+            done, status = run_steps(
                 self.world, self.state, self.port, record, WHOLE, self.steps_done, planned
             )
             self.steps_done += done
@@ -282,10 +223,7 @@ class Simulation:
             except (IapbError, KeyboardInterrupt) as stop:
                 return k, stop
             last = self.steps_done - 1
-            if self.compiled:
-                self._steps(self.world, self.state, self.port, record, WRITE, last, 1)
-            else:
-                self._write(record, int(record.used[0]), last, self.state, self.port)
+            run_steps(self.world, self.state, self.port, record, WRITE, last, 1)
         return steps, None
 
     def _plan(self, steps: int) -> tuple[int, IapbError | None]:
@@ -384,9 +322,8 @@ def simulate(
     total = simulation.scene.steps if steps is None else int(steps)
     recorder = Recorder(simulation, int(every))
     _check_memory(recorder.bytes_per_step, total, int(every), max_memory)
-    with compiling_told(to_stderr):
-        stopped = record(recorder, total, progress)
-        return recorder.run(world, stopped)
+    stopped = record(recorder, total, progress)
+    return recorder.run(world, stopped)
 
 
 def _is_positive(value: Any, kind: Any) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -10,14 +11,14 @@ from numpy.typing import ArrayLike
 
 from iapb.advice.checks import chosen_scene
 from iapb.advice.effects import EFFECT_NAMES, Effect, active_names, decide_for
-from iapb.compiled import Entry, block, flag
+from iapb.compiled import Entry, block
 from iapb.contact.geometry import ContactBuffer, contact_capacity
 from iapb.contact.kernels.broadphase import make_broad_phase
 from iapb.contact.kernels.impact import ImpactWork
 from iapb.contact.kernels.impact_friction import FrictionWork
 from iapb.contact.kernels.implicit import RestWork
 from iapb.contact.kernels.narrow_phase import detect
-from iapb.contact.kernels.step import STATUS_TEXT, TOO_MANY_CONTACTS, advance
+from iapb.contact.kernels.step import STATUS_TEXT, TOO_MANY_CONTACTS
 from iapb.contact.kernels.unilateral import PushWork
 from iapb.contact.kernels.world import State, Switches, World
 from iapb.contact.laws import ImpulseAugmented
@@ -25,6 +26,7 @@ from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling, UnilateralCoupler
 from iapb.haptics.rendering import PLANNED, Port
 from iapb.linalg import cholesky
+from iapb.loop import ADVANCE, make_record, run_steps
 from iapb.mechanics.kernels.arrays import make_workspace
 from iapb.mechanics.mechanism import Mechanism
 from iapb.mechanics.structure import make_free_motion
@@ -35,15 +37,6 @@ from iapb.schema import blank, quantities, zeros_of
 
 _factored = Entry(cholesky)
 
-# Effects whose kernels are compiled only where they are on.
-_COMPILED = (
-    "impact_friction",
-    "friction",
-    "unequal_restitution",
-    "joint_damping",
-    "clustering",
-    "joint_limits",
-)
 _CONTACT_NUMBERS = (
     "stiffness",
     "damping",
@@ -97,7 +90,7 @@ class System:
             start = int(self.mechanism.arrays.q_start[np.argmax(trees == self.tool_tree)])
             self.tool_dofs = self.mechanism.tree_dofs[self.tool_tree]
             self.tool_coordinates = start, start + self.device_mechanism().nq
-        self._worlds: dict[Any, tuple[World, Entry]] = {}
+        self._worlds: dict[Any, World] = {}
 
     def device_mechanism(self) -> Mechanism:
         """Return the mechanism of the device, which equals the tree in the hand (paper VI)."""
@@ -124,7 +117,7 @@ class System:
                     self.pairs,
                     *self.mechanism.placements(q),
                     float(margin),
-                    buffer,
+                    block(buffer),
                 )
             )
         if count < 0:
@@ -132,17 +125,11 @@ class System:
         return ContactBuffer(*(column[:count] for column in buffer))  # type: ignore[arg-type]
 
     def world_under(self, law: Any, effects: Sequence[Effect] | None = None) -> World:
-        """Return the constant arrays of the step under one of the engine's laws (cached).
+        """Return the parameters of the scene, with the switches of its effects under one of the
+        engine's laws; made once.
 
         `effects` is the result of `decide` for the law and any coupling.
         """
-        return self.engine_under(law, effects)[0]
-
-    def engine_under(
-        self, law: Any, effects: Sequence[Effect] | None = None
-    ) -> tuple[World, Entry]:
-        """Return the parameters of the scene with the switches of its effects under a law, and the
-        step; made once."""
         scene, contact, mechanism, law = (
             self.scene,
             self.scene.contact,
@@ -160,18 +147,14 @@ class System:
         if scaled and scene.device is not None:
             limit[slice(*self.tool_dofs)] = scene.device.force_limit
         switches = Switches(
-            **{
-                name: flag(name in on) if name in _COMPILED else name in on
-                for name in Switches._fields
-                if name in EFFECT_NAMES
-            },
-            pushing=flag(law.impulses and law.pushing),
+            **{name: name in on for name in Switches._fields if name in EFFECT_NAMES},
+            pushing=law.impulses and law.pushing,
             impulse_limit=scaled,
             spreading=scaled and law.rendering == "spread",
             contacts=not on.isdisjoint(
                 ("wall_contacts", "body_contacts", "self_collisions", "joint_limits")
             ),
-            supports=flag(contact.forces == "implicit" and self.capacity > 1),
+            supports=contact.forces == "implicit" and self.capacity > 1,
         )
         ranges = np.array(mechanism.tree_dofs, np.int64).reshape(-1, 2)
         world: Any = block(
@@ -190,8 +173,7 @@ class System:
                 clamped=contact.penalty == "clamped",
                 friction_class=self.frictions.class_of_shape,
                 friction=self.frictions.table,
-                implicit=flag(contact.forces == "implicit"),
-                explicit=flag(contact.forces != "implicit"),
+                implicit=contact.forces == "implicit",
                 tangents=self.tangents,
                 restitution=float(
                     self.restitutions[0] if len(self.restitutions) == 1 else contact.restitution
@@ -205,7 +187,21 @@ class System:
                 free=make_free_motion(mechanism.arrays, mechanism.tree_of_body),
             )
         )
-        return self._worlds.setdefault(key, (world, Entry(advance)))
+        return self._worlds.setdefault(key, world)
+
+    def advance(self, law: Any, state: Any, applied_force: ArrayLike) -> int:
+        """Advance the state by one step of an engine's law, under a generalized force (d,) without
+        hand or device; return the status."""
+        port, record = self._alone
+        port.applied[:] = applied_force
+        return int(run_steps(self.world_under(law), state, port, record, ADVANCE, 0, 1)[1])
+
+    @cached_property
+    def _alone(self) -> tuple[Any, Any]:
+        """A port without a coupling, and a record that is never written."""
+        port = self.make_port(NoCoupling())
+        coordinates = self.mechanism.nq, self.mechanism.nv, len(port.device_q), len(port.device_v)
+        return port, make_record(1, coordinates, self.capacity, len(self.mechanism.tree_dofs))
 
     def make_state(self) -> Any:
         """Return a new state at the scene's start."""
@@ -295,8 +291,8 @@ class System:
         port = Port(
             **blank(quantities(Port), lengths),
             coupling=coupling.kind,
-            device=flag(not isinstance(coupling, NoCoupling)),
-            hand=flag(hand is not None),
+            device=not isinstance(coupling, NoCoupling),
+            hand=hand is not None,
             tool_tree=self.tool_tree,
             q_start=q_start,
             q_stop=q_stop,

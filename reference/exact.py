@@ -20,7 +20,6 @@ from fractions import Fraction
 from functools import cache, partial
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -193,24 +192,29 @@ def bulk_energy_gain(
                 f"magnitudes in [{_SMALLEST:g}, {_LARGEST:g}] or 0; use relative_energy_gain beyond"
             )
             raise ArgumentError(argument, array, expected)
-    gain, bound = np.empty(n), np.empty(n)
-    if masses.ndim == 2:
-        masses = masses[None] if n == 1 else np.broadcast_to(masses, (n, d, d))
-    symmetric = (masses == np.swapaxes(masses, -1, -2)).all(axis=(-2, -1))
-    _gains(np.ascontiguousarray(masses), symmetric, before, after, gain, bound)
-    return gain, bound
+    masses = np.broadcast_to(masses, (n, d, d))
+    difference, total = _two_sum(after, -before), _two_sum(after, before)
+    change, change_low, size = _bilinear(masses, difference, total)
+    turned, turned_low, turned_size = _bilinear(masses, total, difference)
+    change, size = 0.5 * _add(change, change_low, turned, turned_low)[0], 0.5 * (size + turned_size)
+    at_rest = np.zeros_like(before)
+    energy, _, energy_size = _bilinear(masses, (before, at_rest), (before, at_rest))
+    known = energy > d * d * _ROUNDING * energy_size
+    energy = np.where(known, energy, 1.0)
+    gain = change / energy
+    rounding = 4.0 * abs(gain) * 2.0**-53  # the final division and the dropped low parts
+    bound = 2.0 * d * _ROUNDING * (size + abs(gain) * energy_size) / energy + rounding
+    return np.where(known, gain, np.nan), np.where(known, bound, np.inf)
 
 
-@numba.njit(cache=True, fastmath=False)
-def _two_sum(a, b):  # type: ignore[no-untyped-def]
+def _two_sum(a: Any, b: Any) -> tuple[Any, Any]:
     """Return a + b as an exact pair (sum, error)."""
     s = a + b
     t = s - a
     return s, (a - (s - t)) + (b - t)
 
 
-@numba.njit(cache=True, fastmath=False)
-def _two_product(a, b):  # type: ignore[no-untyped-def]
+def _two_product(a: Any, b: Any) -> tuple[Any, Any]:
     """Return a b as an exact pair (product, error)."""
     p = a * b
     c = _SPLITTER * a
@@ -222,8 +226,7 @@ def _two_product(a, b):  # type: ignore[no-untyped-def]
     return p, a2 * b2 - (((p - a1 * b1) - a2 * b1) - a1 * b2)
 
 
-@numba.njit(cache=True, fastmath=False)
-def _add(ah, al, bh, bl):  # type: ignore[no-untyped-def]
+def _add(ah: Any, al: Any, bh: Any, bl: Any) -> tuple[Any, Any]:
     """Return the double-double sum, in the accurate variant that keeps both low parts."""
     sh, sl = _two_sum(ah, bh)
     th, tl = _two_sum(al, bl)
@@ -231,52 +234,26 @@ def _add(ah, al, bh, bl):  # type: ignore[no-untyped-def]
     return _two_sum(sh, sl + tl)
 
 
-@numba.njit(cache=True, fastmath=False)
-def _multiply(ah, al, bh, bl):  # type: ignore[no-untyped-def]
+def _multiply(ah: Any, al: Any, bh: Any, bl: Any) -> tuple[Any, Any]:
     """Return the double-double product."""
     ph, pl = _two_product(ah, bh)
     return _two_sum(ph, pl + (ah * bl + al * bh))
 
 
-@numba.njit(cache=True, fastmath=False)
-def _bilinear(mass, ah, al, bh, bl):  # type: ignore[no-untyped-def]
-    """Return aᵀ M b as a double-double, and the sum of |a_i M_ij b_j|, for double-double vectors a
-    and b."""
-    high, low, size = 0.0, 0.0, 0.0
-    for i in range(len(ah)):
-        rh, rl = 0.0, 0.0
-        for j in range(len(bh)):
-            th, tl = _multiply(bh[j], bl[j], mass[i, j], 0.0)
-            rh, rl = _add(rh, rl, th, tl)
-            size += abs(ah[i] * th)
-        th, tl = _multiply(ah[i], al[i], rh, rl)
-        high, low = _add(high, low, th, tl)
-    return high, low, size
-
-
-@numba.njit(cache=True, fastmath=False)
-def _gains(masses, symmetric, before, after, gain, bound):  # type: ignore[no-untyped-def]
-    """Write the relative gain and its bound for each impact."""
-    n, d = before.shape
-    difference, difference_low = np.empty(d), np.empty(d)
-    total, total_low, zero = np.empty(d), np.empty(d), np.zeros(d)
-    for k in range(n):
-        for i in range(d):
-            difference[i], difference_low[i] = _two_sum(after[k, i], -before[k, i])
-            total[i], total_low[i] = _two_sum(after[k, i], before[k, i])
-        change, low, size = _bilinear(masses[k], difference, difference_low, total, total_low)
-        if not symmetric[k]:
-            turned, turned_low, turned_size = _bilinear(
-                masses[k], total, total_low, difference, difference_low
-            )
-            change, size = (
-                0.5 * _add(change, low, turned, turned_low)[0],
-                0.5 * (size + turned_size),
-            )
-        energy, _, energy_size = _bilinear(masses[k], before[k], zero, before[k], zero)
-        if not energy > d * d * _ROUNDING * energy_size:
-            gain[k], bound[k] = np.nan, np.inf
-            continue
-        gain[k] = change / energy
-        rounding = 4.0 * abs(gain[k]) * 2.0**-53  # the final division and the dropped low parts
-        bound[k] = 2.0 * d * _ROUNDING * (size + abs(gain[k]) * energy_size) / energy + rounding
+def _bilinear(
+    masses: Floats, a: tuple[Floats, Floats], b: tuple[Floats, Floats]
+) -> tuple[Floats, Floats, Floats]:
+    """Return aᵀ M b (n,) as a double-double, and the sum of |a_i M_ij b_j|, for double-double
+    vectors a and b (n, d)."""
+    n, d, _ = masses.shape
+    (a_high, a_low), (b_high, b_low) = a, b
+    felt = _multiply(b_high[:, None, :], b_low[:, None, :], masses, 0.0)
+    terms = _multiply(a_high[:, :, None], a_low[:, :, None], *felt)
+    high, low = (part.reshape(n, d * d) for part in terms)
+    size = np.abs(high).sum(axis=1)
+    while high.shape[1] > 1:  # add halves: fewer roundings than one after another
+        if high.shape[1] % 2:
+            high, low = (np.pad(part, ((0, 0), (0, 1))) for part in (high, low))
+        half = high.shape[1] // 2
+        high, low = _add(high[:, :half], low[:, :half], high[:, half:], low[:, half:])
+    return high[:, 0], low[:, 0], size

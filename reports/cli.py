@@ -48,10 +48,6 @@ GROUPS = {  # of the help, in its order
     "The paper": ("reproduce", "report"),
 }
 
-# Many scenes share kernels compiled whole (see `iapb.compiled`); other commands compile what one
-# scene needs.
-MANY_SCENES = ("verify", "bench", "sweep", "store", "reproduce")
-
 COMPLETION = "_IAPB_COMPLETE"  # set while a shell asks for completions
 STOPPED = "stopped; files that were complete stay"
 
@@ -85,8 +81,6 @@ def _app(given: list[str]) -> typer.Typer:
     if COMPLETION in os.environ:  # shell completion: the shell passes the words in a variable
         given = os.environ.get("COMP_WORDS", os.environ.get("_TYPER_COMPLETE_ARGS", "")).split()[1:]
     wanted = next((word for word in given if not word.startswith("-")), "")
-    if wanted in MANY_SCENES:
-        os.environ.setdefault("IAPB_COMPILE", "whole")
     for name, words in COMMANDS.items():
         group = next(title for title, names in GROUPS.items() if name in names)
         if name == wanted:

@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from iapb.compiling import compiling_told, to_stderr
-from iapb.errors import IapbError, harmless
+from iapb.errors import IapbError, harmless, to_stderr
 from reports.store.keys import plain
 
 if TYPE_CHECKING:
@@ -161,7 +160,7 @@ def stage_progress(
 
     console = Console(stderr=True)
     if not console.is_terminal or console.is_dumb_terminal:
-        with compiling_told(to_stderr), _logged(begun) as log:
+        with _logged(begun) as log:
             yield log
         return
     name = TextColumn("{task.description}", markup=False)  # a scene's name may hold brackets
@@ -176,7 +175,7 @@ def stage_progress(
         transient=transient,
         redirect_stdout=sys.stdout.isatty(),
     )
-    with bars, compiling_told(bars.console.print):
+    with bars:
         tasks = {harmless(begun): bars.add_task(harmless(begun), total=None)} if begun else {}
 
         def progress(stage: str, done: int, total: int) -> None:

@@ -14,7 +14,6 @@ from multiprocessing import active_children, get_context, parent_process
 from threading import Thread
 from typing import Any
 
-from iapb.compiling import tell_from_worker
 from iapb.errors import ArgumentError, IapbError, MissingDependencyError, installing
 
 # Loggers of dask: if the scheduler dies, one sentence of ours is printed without their tracebacks.
@@ -70,9 +69,8 @@ class _Processes(ProcessPoolExecutor):
     submit = _without_ctrl_c()(ProcessPoolExecutor.submit)
 
 
-def _begin(told: Any) -> None:
-    """Initialise a worker. It ends with its parent, also a killed one; the first one that compiles
-    says so."""
+def _begin() -> None:
+    """Initialise a worker: it ends with its parent, also a killed one."""
 
     def watch() -> None:
         parent: Any = parent_process()
@@ -80,15 +78,12 @@ def _begin(told: Any) -> None:
         os._exit(1)
 
     Thread(target=watch, daemon=True).start()
-    tell_from_worker(told)
 
 
 @contextmanager
 def _processes(workers: int) -> Iterator[Executor]:
     others = set(active_children())
-    context = get_context("spawn")
-    told = context.Value("b", False)
-    pool = _Processes(workers, mp_context=context, initializer=_begin, initargs=(told,))
+    pool = _Processes(workers, mp_context=get_context("spawn"), initializer=_begin)
     try:
         yield pool
     except BrokenProcessPool as error:

@@ -2,7 +2,7 @@
 machine settings.
 
 A setting chooses other machine code for BLAS (OPENBLAS_CORETYPE), numpy (NPY_DISABLE_CPU_FEATURES),
-compiled kernels (NUMBA_CPU_NAME), the C library's sin and exp (GLIBC_TUNABLES) or the number of
+the engine (IAPB_BUILD_FOR), the C library's sin and exp (GLIBC_TUNABLES) or the number of
 threads. Every setting is compared with `default`, the settings that the machine chooses itself:
 
 - runs of engine worlds, and impacts: equal bit for bit, for the kernels call no BLAS
@@ -66,7 +66,8 @@ SETTINGS: dict[str, dict[str, str]] = {
     "numpy-baseline": {
         "NPY_DISABLE_CPU_FEATURES": "?"
     },  # numpy gives the names; it silently ignores wrong ones
-    "numba-generic": {"NUMBA_CPU_NAME": "generic"},
+    "x86-64-v3": {"IAPB_BUILD_FOR": "x86-64-v3"},
+    "x86-64-v4": {"IAPB_BUILD_FOR": "x86-64-v4"},
     "libm-baseline": {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4"},
     "one-thread": {"OPENBLAS_NUM_THREADS": "1"},
     "two-threads": {"OPENBLAS_NUM_THREADS": "2"},
@@ -139,7 +140,7 @@ def try_setting(name: str, folder: Path, parts: list[str], workers: str) -> dict
         return row
     print(
         f"{name}: {' '.join(f'{key}={value}' for key, value in setting.items()) or 'nothing set'}; "
-        f"BLAS {'/'.join(facts['blas'])}, {facts['threads']} threads, kernels for {facts['numba']}",
+        f"BLAS {'/'.join(facts['blas'])}, {facts['threads']} threads, engine for {facts['engine']}",
         file=sys.stderr,
         flush=True,
     )
@@ -159,6 +160,8 @@ def environment(name: str, machine: dict[str, Any], here: Path) -> tuple[dict[st
         "Zen": "AVX2",
         "Sandybridge": "AVX",
         "libm-baseline": "FMA3",
+        "x86-64-v3": "AVX2",
+        "x86-64-v4": "AVX512_SKX",
     }.get(name)
     if lacking and lacking not in machine["features"]:
         return setting, f"the processor lacks {lacking}"
@@ -166,8 +169,6 @@ def environment(name: str, machine: dict[str, Any], here: Path) -> tuple[dict[st
         if not machine["optional"]:
             return setting, "the processor has none of the features that numpy has code for"
         setting["NPY_DISABLE_CPU_FEATURES"] = " ".join(machine["optional"])
-    if name == "numba-generic":  # a separate cache, so that no code for this processor is used
-        setting["NUMBA_CACHE_DIR"] = str(here / "numba")
     return setting, ""
 
 
@@ -177,8 +178,8 @@ def not_in_force(name: str, facts: dict[str, Any], machine: dict[str, Any]) -> s
         return f"OpenBLAS took {facts['blas']}"
     if name == "numpy-baseline" and facts["optional"]:
         return f"numpy still uses {facts['optional']}"
-    if name == "numba-generic" and facts["numba"] != "generic":
-        return f"numba compiles for {facts['numba']}"
+    if name.startswith("x86") and name != facts["engine"]:
+        return f"the engine is made for {facts['engine']}"
     if name == "libm-baseline" and facts["libm"] == machine["libm"]:
         return "the C library gives the same sines"
     wanted = {"one-thread": 1, "two-threads": min(2, os.cpu_count() or 1)}.get(
@@ -371,10 +372,12 @@ def child_facts(path: Path) -> None:
     import math
 
     import scipy.linalg  # noqa: F401 - loads its own BLAS
-    from numba.core.registry import cpu_target
     from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
     from threadpoolctl import threadpool_info
 
+    from iapb.library import PATH, library, manifest_of
+
+    library()  # made again if it is for another processor
     blas = [one for one in threadpool_info() if one["user_api"] == "blas"]
     sines = np.array([math.sin(k / 997.0) for k in range(20_000)])
     facts = {
@@ -382,7 +385,7 @@ def child_facts(path: Path) -> None:
         "threads": max(one["num_threads"] for one in blas),
         "features": [key for key, there in __cpu_features__.items() if there],
         "optional": [key for key in __cpu_dispatch__ if __cpu_features__[key]],
-        "numba": cpu_target.target_context.codegen().magic_tuple()[1],
+        "engine": manifest_of(PATH)["stamp"].split()[1],
         "libm": hashlib.sha256(sines.tobytes()).hexdigest(),
     }
     path.write_text(json.dumps(facts), encoding="utf-8")

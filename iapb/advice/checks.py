@@ -145,7 +145,7 @@ class Start:
             self.stops,
         )
         count = (
-            max(int(detect(block(self.shapes), self.pairs, *places, margin, out)), 0)
+            max(int(detect(block(self.shapes), self.pairs, *places, margin, block(out))), 0)
             if len(self.pairs)
             else 0
         )

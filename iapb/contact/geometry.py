@@ -13,7 +13,6 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from iapb.compiled import flag
 from iapb.schema import Booleans, Floats, Indices, Integers, States
 
 HALF_PLANE, CIRCLE, POLYGON = 0, 1, 2
@@ -48,9 +47,9 @@ class Shapes(NamedTuple):
     # (n, 3, 3) box: its axes as columns; half-space: column 2 is the unit outward normal
     axes: Floats
     half_size: Floats  # (n, 3) [m] of a box, along its axes
-    space: Any  # whether they are shapes in space (`iapb.compiled.flag`)
-    polygons: Any  # whether one of them is a polygon
-    balls: Any  # whether two of them are circles or spheres
+    space: bool  # whether they are shapes in space
+    polygons: bool  # whether one of them is a polygon
+    balls: bool  # whether two of them are circles or spheres
 
 
 class ContactBuffer(NamedTuple):
@@ -111,9 +110,9 @@ def make_shapes(given: Sequence[Shape], space: bool) -> Shapes:
         np.array(center, float).reshape(n, 3),
         np.array(axes, float).reshape(n, 3, 3),
         np.array(half_size, float).reshape(n, 3),
-        flag(space),
-        flag(POLYGON in kind),
-        flag(sum(one in (CIRCLE, SPHERE) for one in kind) > 1),
+        space,
+        POLYGON in kind,
+        sum(one in (CIRCLE, SPHERE) for one in kind) > 1,
     )
 
 

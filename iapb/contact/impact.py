@@ -8,7 +8,7 @@ projector onto the row space of A, which is applied through an orthonormal basis
 
 from __future__ import annotations
 
-from functools import lru_cache
+import threading
 from numbers import Real
 from typing import Any, NamedTuple
 
@@ -20,6 +20,7 @@ from iapb.contact.kernels.resolve import (
     LARGEST_ENTRY,
     NOT_CONVERGED,
     SYMMETRY_TOLERANCE,
+    Batch,
     ResolveWork,
     Results,
     resolve_each,
@@ -29,7 +30,7 @@ from iapb.linalg import cholesky
 from iapb.names import one_of
 from iapb.schema import Floats, zeros_of
 
-Arrays = tuple[Floats, Floats, Floats]  # M (n, d, d), J (n, c, d), v (n, d)
+Arrays = tuple[Floats, Floats, Floats]  # M (d, d), J (c, d), v (d,), or n of each
 METHODS = ("factored", "poisson")
 NEWTON, POISSON, COULOMB = (
     "Newton, equality",
@@ -37,9 +38,7 @@ NEWTON, POISSON, COULOMB = (
     "Newton, equality, with Coulomb friction",
 )
 _STATUS = "complete", "budget", "cancelled", "reduced", "not solved"  # the kernel's codes
-_ENTRIES = {
-    law: Entry(resolve_each) for law in (NEWTON, POISSON, COULOMB)
-}  # each compiles only what its law needs
+_resolve_each = Entry(resolve_each)
 _ONE = "mass_matrix", "contact_jacobian", "velocity"
 _MANY = "mass_matrices", "contact_jacobians", "velocities"
 _DOUBLE = np.dtype(np.float64)
@@ -160,16 +159,18 @@ def resolve_impact(
     section V.
     """
     arrays = _checked(_ONE, mass_matrix, contact_jacobian, velocity)
-    c = arrays[1].shape[1]
-    e = _coefficients("restitution", restitution, c, "contact", -1.0)
+    contacts = len(arrays[1])
+    e = _coefficients("restitution", restitution, contacts, "contact", -1.0)
     if not isinstance(method, str) or method not in METHODS:
         raise ArgumentError("method", method, one_of(method, METHODS))
-    one_for_all = method == "factored" and (e.ndim == 0 or bool((e == e[:1]).all()))
+    if not isinstance(e, float) and method == "factored" and (e == e[:1]).all():
+        e = float(e[0]) if contacts else 0.0
+    one_for_all = isinstance(e, float) and method == "factored"
     options = _options(budget, clamp, rank_tolerance, one_for_all)
     if one_for_all:
-        return _resolve(arrays, e.reshape(-1)[:1] if e.size else np.zeros(1), NEWTON, options)
-    unequal = np.full((1, c), _coefficients("restitution", restitution, c, "contact", 0.0))
-    return _resolve(arrays, np.zeros(1), POISSON, options, method=method, unequal=unequal)
+        return _resolve_one(arrays, NEWTON, options, restitution=e)
+    e = _coefficients("restitution", restitution, contacts, "contact", 0.0)
+    return _resolve_one(arrays, POISSON, options, method=method, unequal=e)
 
 
 def resolve_impacts(
@@ -206,9 +207,31 @@ def resolve_impacts(
         with the number of this impact: ``mass_matrices[17, 0, 0]``.
     """
     arrays = _checked(_MANY, mass_matrices, contact_jacobians, velocities)
-    n = len(arrays[0])
-    e = np.full(n, _coefficients("restitution", restitution, n, "impact", -1.0))
-    return _resolve(arrays, e, NEWTON, _options(budget, clamp, rank_tolerance, True), many=True)
+    n, c, d = arrays[1].shape
+    rows, clamped, tolerance = _options(budget, clamp, rank_tolerance, True)
+    batch = make_batch(n, c, d)
+    batch.masses[:], batch.jacobians[:], batch.velocities[:] = arrays
+    batch.restitution[:] = _coefficients("restitution", restitution, n, "impact", -1.0)
+    done = _resolve_each(batch, tolerance, d if rows is None else min(rows, d), clamped)
+    out = batch.out
+    if done < n:
+        raise diagnose(*arrays, out, done, many=True)
+    rank, status, change, low, high, kept, share = out.numbers.T
+    return Impact(
+        out.velocity,
+        out.generalized_impulse,
+        out.impulses,
+        rank.astype(np.int64),
+        change,
+        np.column_stack((low, high)),
+        kept,
+        np.array(_STATUS)[status.astype(np.int64)],
+        "factored",
+        NEWTON,
+        rows,
+        np.zeros((n, c, 0)),
+        share,
+    )
 
 
 def resolve_frictional_impact(
@@ -254,11 +277,9 @@ def resolve_frictional_impact(
     if np.ndim(restitution) != 0:
         raise ArgumentError("restitution", restitution, "one number for all contacts")
     arrays = _checked(_ONE, mass_matrix, contact_jacobian, velocity)
-    c, d = arrays[1].shape[1:]
-    e = _coefficients("restitution", restitution, c, "contact", 0.0)
-    mu = np.full(
-        (1, c), _coefficients("friction", friction, c, "contact", 0.0, np.finfo(float).max)
-    )
+    c, d = arrays[1].shape
+    e = float(_coefficients("restitution", restitution, c, "contact", 0.0))
+    mu = _coefficients("friction", friction, c, "contact", 0.0, np.finfo(float).max)
     T = (
         _array("tangents", tangents, 2 if np.ndim(tangents) == 2 else 3)
         if c or np.size(tangents)
@@ -271,76 +292,40 @@ def resolve_frictional_impact(
         )
     if not np.isfinite(T).all():
         raise ArgumentError("tangents", "a number that is not finite", "finite numbers")
-    along = np.ascontiguousarray(T).reshape(1, -1, d)
-    return _resolve(
-        arrays,
-        e.reshape(1),
-        COULOMB,
-        (None, True, 0.0),
-        tangents=along,
-        friction=mu,
-        directions=T.shape[1],
-    )
+    rough = T.reshape(-1, d), mu, T.shape[1]
+    return _resolve_one(arrays, COULOMB, (None, True, 0.0), restitution=e, rough=rough)
 
 
-def _resolve(
+def _resolve_one(
     arrays: Arrays,
-    restitution: Floats,
     law: str,
     options: tuple[int | None, bool, float],
     *,
     method: str = "factored",
+    restitution: float = 0.0,
     unequal: Floats | None = None,
-    tangents: Floats | None = None,
-    friction: Floats | None = None,
-    directions: int = 0,
-    many: bool = False,
+    rough: tuple[Floats, Floats, int] | None = None,
 ) -> Impact:
-    """Resolve n impacts in one compiled call; return the first, or all if there are many."""
-    (n, c, d), (budget, clamped, tolerance) = arrays[1].shape, options
-    out = Results(
-        np.empty((n, d)),
-        np.empty((n, d)),
-        np.empty((n, c)),
-        np.empty((n, c * directions)),
-        np.empty((n, 7)),
-    )
-    limit = d if budget is None else min(budget, d)
-    done = _ENTRIES[law](
-        *arrays,
-        restitution,
-        unequal,
-        tangents,
-        friction,
-        tolerance,
-        limit,
-        clamped,
-        _scratch(d, c, directions),
-        out,
-    )
-    if done < n:
-        raise diagnose(*arrays, out, done, many)
-    along = out.tangential.reshape(n, c, directions)
-    if many:
-        rank, status, change, low, high, clamp, share = out.numbers.T
-        return Impact(
-            *out[:3],
-            rank.astype(np.int64),
-            change,
-            np.column_stack((low, high)),
-            clamp,
-            np.array(_STATUS)[status.astype(np.int64)],
-            method,
-            law,
-            budget,
-            along,
-            share,
-        )
-    rank, status, change, low, high, clamp, share = out.numbers[0].tolist()
+    """Resolve one impact; `rough`: tangents (c m, d), friction, and m."""
+    M, J, v = arrays
+    (contacts, d), (budget, clamped, tolerance) = J.shape, options
+    directions = rough[2] if rough else 0
+    one = _batch_for_one(contacts, d, directions, unequal is not None)
+    one.mass[...], one.jacobian[...], one.velocity[...] = M, J, v
+    batch = one.batch
+    batch.restitution[0] = restitution
+    if unequal is not None:
+        batch.unequal[0] = unequal
+    if rough:
+        batch.tangents[0], batch.friction[0] = rough[:2]
+    done = _resolve_each(batch, tolerance, d if budget is None else min(budget, d), clamped)
+    if not done:
+        raise diagnose(M[None], J[None], v[None], batch.out, 0, many=False)
+    rank, status, change, low, high, clamp, share = one.numbers.tolist()
     return Impact(
-        out.velocity[0],
-        out.generalized_impulse[0],
-        out.impulses[0],
+        one.after.copy(),
+        one.generalized_impulse.copy(),
+        one.impulses.copy(),
         int(rank),
         change,
         (low, high),
@@ -349,24 +334,71 @@ def _resolve(
         method,
         law,
         budget,
-        along[0],
+        one.tangential.copy(),
         share,
     )
 
 
-@lru_cache(maxsize=256)  # laying out a block takes longer than resolving a small impact
-def _scratch(coordinates: int, contacts: int, tangents: int) -> Any:
-    """Return scratch that all calls of this size share: a kernel holds the interpreter's lock while
-    it runs."""
-    rows = max(1, contacts)
+def make_batch(n: int, c: int, d: int, directions: int = 0, unequal: bool = False) -> Any:
+    """Return memory for n impacts of c contacts on d coordinates, and their results."""
+    rows = max(1, c)
+    rubbing = n if directions else 0
     return block(
-        zeros_of(
-            ResolveWork, velocity=coordinates, row=rows, tangent=rows * tangents, direction=tangents
+        Batch(
+            masses=np.empty((n, d, d)),
+            jacobians=np.empty((n, c, d)),
+            velocities=np.empty((n, d)),
+            restitution=np.empty(n),
+            unequal=np.empty((n if unequal else 0, c)),
+            tangents=np.empty((rubbing, c * directions, d)),
+            friction=np.empty((rubbing, c)),
+            work=zeros_of(
+                ResolveWork, velocity=d, row=rows, tangent=rows * directions, direction=directions
+            ),
+            out=Results(
+                np.empty((n, d)),
+                np.empty((n, d)),
+                np.empty((n, c)),
+                np.empty((n, c * directions)),
+                np.empty((n, 7)),
+            ),
         )
     )
 
 
-def diagnose(M: Floats, J: Floats, v: Floats, out: Results, refused: int, many: bool) -> IapbError:
+class _One:
+    """Memory for one impact, with views on it."""
+
+    def __init__(self, c: int, d: int, directions: int, unequal: bool) -> None:
+        self.batch = batch = make_batch(1, c, d, directions, unequal)
+        self.mass, self.jacobian = batch.masses[0], batch.jacobians[0]
+        self.velocity, self.after = batch.velocities[0], batch.out.velocity[0]
+        self.generalized_impulse = batch.out.generalized_impulse[0]
+        self.impulses, self.numbers = batch.out.impulses[0], batch.out.numbers[0]
+        self.tangential = batch.out.tangential.reshape(c, directions)
+
+
+class _Kept(threading.local):
+    """Memory for one impact of each size; each thread has its own."""
+
+    def __init__(self) -> None:
+        self.of_size: dict[tuple[int, int, int, bool], _One] = {}
+
+
+_KEPT, _MOST_KEPT = _Kept(), 256
+
+
+def _batch_for_one(*size: Any) -> _One:
+    """Return memory for one impact; to make it takes longer than to resolve a small impact."""
+    kept = _KEPT.of_size
+    if size not in kept:
+        if len(kept) >= _MOST_KEPT:
+            kept.clear()
+        kept[size] = _One(*size)
+    return kept[size]
+
+
+def diagnose(M: Floats, J: Floats, v: Floats, out: Any, refused: int, many: bool) -> IapbError:
     """Return the error that explains why the kernel refused one of n impacts, given as arrays (n,
     ...).
 
@@ -406,7 +438,7 @@ def diagnose(M: Floats, J: Floats, v: Floats, out: Results, refused: int, many: 
             f"Poisson's law: the active-set method did not converge on {len(J)} contacts"
         )
     quantities = names[2], "generalized_impulse", "impulses", "tangential_impulses"
-    for quantity, values in zip(quantities, out, strict=False):
+    for quantity, values in zip(quantities, out.members.values(), strict=False):
         if not np.isfinite(values[refused]).all():
             return RangeError(named(quantity), "the impact of these magnitudes is above 1.8e308")
     return RangeError(
@@ -431,7 +463,7 @@ def _checked(names: tuple[str, str, str], mass_matrix: Any, jacobian: Any, veloc
         raise ArgumentError(
             names[1], J.shape, f"shape ({', '.join(map(str, (*lead, 'contacts', d)))})"
         )
-    return (M, J, v) if many else (M[None], J[None], v[None])
+    return M, J, v
 
 
 def real_numbers(value: Any) -> NDArray[Any] | None:
@@ -475,10 +507,10 @@ def _array(name: str, value: Any, dimensions: int) -> Floats:
 
 def _coefficients(
     name: str, value: Any, size: int, each: str, low: float, high: float = 1.0
-) -> Floats:
+) -> Any:
     """Return one number, or one for each of `size` contacts or impacts, between low and high."""
     if type(value) is float and low <= value <= high:
-        return np.array(value)
+        return value
     given = real_numbers(value)
     if given is None or given.shape not in ((), (size,)):
         raise ArgumentError(name, value, f"a real number or shape ({size},), one per {each}")
@@ -489,7 +521,7 @@ def _coefficients(
             float(numbers.flat[i]),
             f"a number in [{low:g}, 1]" if high == 1.0 else "a finite number >= 0",
         )
-    return numbers
+    return numbers if numbers.ndim else float(numbers)
 
 
 def _options(

@@ -12,8 +12,6 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 from typing import Any, NamedTuple, Protocol, Self
 
-import numpy as np
-
 from iapb.contact.kernels.step import STATUS_TEXT
 from iapb.contact.kernels.world import State
 from iapb.errors import ArgumentError, IapbError
@@ -108,14 +106,13 @@ class _EngineLaw:
 
     def advance(self, system: Any, state: State, applied_force: Floats, dt: float) -> StepResult:
         """Advance one step by the compiled kernel (see `ContactLaw`)."""
-        world, step = system.engine_under(self)
-        if dt != world.dt:
+        if dt != system.dt:
             raise ArgumentError(
                 "dt",
                 dt,
-                f"the step of the scene, {world.dt!r} s; to change it, set the scene's rate",
+                f"the step of the scene, {system.dt!r} s; to change it, set the scene's rate",
             )
-        status = step(world, state, np.ascontiguousarray(applied_force, np.float64))
+        status = system.advance(self, state, applied_force)
         if status:
             raise IapbError(STATUS_TEXT[status])
         return copied_step(system, state)

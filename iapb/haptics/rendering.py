@@ -3,7 +3,7 @@ and VI)."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from iapb.compiled import copy_into, kernel
 from iapb.contact.kernels.narrow_phase import detect
@@ -25,8 +25,8 @@ class Port(NamedTuple):
     """Hand, coupling and device of one world; `iapb.system` makes it from the fields."""
 
     coupling: int  # NO_COUPLING, FOUR_CHANNEL, UNILATERAL
-    device: Any  # whether there is one (`iapb.compiled.flag`)
-    hand: Any  # whether there is one
+    device: bool  # whether there is one
+    hand: bool  # whether there is one
     tool_tree: int  # -1: no tool is held
     q_start: int  # the tool's range in q
     q_stop: int
@@ -83,7 +83,7 @@ class Port(NamedTuple):
 # Measurement of the device: quantised sensors and delay.
 
 
-@kernel(needs="device")
+@kernel
 def measure(world, port):
     """Write the state of the device as the simulation reads it: quantised by the sensors, and
     delayed."""
@@ -132,7 +132,7 @@ def sense(world, port, velocity):
 # The forces on the tool in one step: the hand's and the position channels' (paper VI).
 
 
-@kernel(needs="hand")
+@kernel
 def couple(world, state, port):
     """Write the forces on the tool for this step: the hand's J_hᵀF_h and the position channels' PD.
 
@@ -176,7 +176,7 @@ def press(mechanism, body, held, port, out):
         k = mechanism.dof_parent[k]
 
 
-@kernel(needs="device")
+@kernel
 def coordinate(state, port):
     """Write the PD force of the position channels on the tool; its opposite acts on the device."""
     port.coupling_force[:] = 0.0
@@ -204,7 +204,7 @@ def render(world, state, port):
     command(port)
 
 
-@kernel(needs="device")
+@kernel
 def command(port):
     """Write the actuator force: F_env (four-channel only) minus the PD, clipped to the device's
     limits and delayed."""
@@ -219,7 +219,7 @@ def command(port):
         port.device_force[i] = port.delayed_force[(port.clock[0] + 1) % slots, i]
 
 
-@kernel(needs="device", otherwise=True)
+@kernel
 def move_device(world, state, port):
     """Integrate M ẍ = F_h + F_env,applied − PD − b ẋ by semi-implicit Euler; return False if the
     motion diverged.

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterable
-from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -30,31 +29,24 @@ from iapb.schema import Floats, Integers
 __all__ = ["Body", "Joint", "Mechanism"]
 
 
-@cache
-def _entries_for(kind: Any) -> SimpleNamespace:
-    """Return the kernels that Python calls with mechanisms of this type of block (see `Entry`)."""
-    return SimpleNamespace(
-        **{
-            kernel.__name__: Entry(kernel)
-            for kernel in (
-                configuration.difference,
-                configuration.integrate,
-                dynamics.gravity,
-                dynamics.inverse_dynamics,
-                linalg.all_finite,
-                evaluation.biases_at,
-                evaluation.centroidal_momentum,
-                evaluation.displacements_along,
-                evaluation.energies_along,
-                evaluation.mass_matrices_at,
-                evaluation.misplaced_body,
-                evaluation.poses_along,
-                evaluation.rows_along,
-                kinematics.forward_kinematics,
-                kinematics.frame_jacobian,
-            )
-        }
-    )
+_CALLED = (
+    configuration.difference,
+    configuration.integrate,
+    dynamics.gravity,
+    dynamics.inverse_dynamics,
+    linalg.all_finite,
+    evaluation.biases_at,
+    evaluation.centroidal_momentum,
+    evaluation.displacements_along,
+    evaluation.energies_along,
+    evaluation.mass_matrices_at,
+    evaluation.misplaced_body,
+    evaluation.poses_along,
+    evaluation.rows_along,
+    kinematics.forward_kinematics,
+    kinematics.frame_jacobian,
+)
+_KERNELS = SimpleNamespace(**{kernel.__name__: Entry(kernel) for kernel in _CALLED})
 
 
 class _Scratch(threading.local):
@@ -118,7 +110,6 @@ class Mechanism:
         self.nq, self.nv = len(self.coordinate_names), len(self.velocity_names)
         self.arrays: MechanismArrays = structure.collect_arrays(self.bodies, parents)
         self.block: Any = block(self.arrays)
-        self._entries = _entries_for(self.block.block_type)
         self.tree_of_body: Integers = np.array(trees, np.int64)
         starts = self.arrays.v_start[
             np.flatnonzero(np.diff(self.tree_of_body, prepend=-1))
@@ -166,13 +157,13 @@ class Mechanism:
         """Return q (nq,) moved for dt [s] with the constant velocity v: q + v dt on vector
         coordinates."""
         return self._filled(
-            (self.nq,), self._entries.integrate, self._place(q), self._rates(v), float(dt)
+            (self.nq,), _KERNELS.integrate, self._place(q), self._rates(v), float(dt)
         )
 
     def difference(self, q0: ArrayLike, q1: ArrayLike) -> Floats:
         """Return v (d,) with integrate(q0, v, 1) = q1, by the shortest rotations."""
         return self._filled(
-            (self.nv,), self._entries.difference, self._place(q0, "q0"), self._place(q1, "q1")
+            (self.nv,), _KERNELS.difference, self._place(q0, "q0"), self._place(q1, "q1")
         )
 
     def placements(self, q: ArrayLike) -> tuple[Floats, Floats]:
@@ -188,12 +179,12 @@ class Mechanism:
         """
         places = float_array("qs", qs, (-1, self.nq))
         shape = len(places), len(self.bodies), 3 if planar else 7
-        return self._filled(shape, self._entries.poses_along, self._scratch.workspace, places)
+        return self._filled(shape, _KERNELS.poses_along, self._scratch.workspace, places)
 
     def mass_matrix(self, q: ArrayLike) -> Floats:
         """Return M(q) (d, d)."""
         place, out = float_array("q", q, (self.nq,)), np.empty((1, self.nv, self.nv))
-        if not self._entries.mass_matrices_at(self._parts, self._scratch.parts, place[None], out):
+        if not _KERNELS.mass_matrices_at(self._parts, self._scratch.parts, place[None], out):
             self._place(place)
         return out[0]
 
@@ -201,7 +192,7 @@ class Mechanism:
         """Return M (n, d, d) at each of the n configurations qs (n, nq), in one compiled call."""
         places = float_array("qs", qs, (-1, self.nq))
         out = np.empty((len(places), self.nv, self.nv))
-        if not self._entries.mass_matrices_at(self._parts, self._scratch.parts, places, out):
+        if not _KERNELS.mass_matrices_at(self._parts, self._scratch.parts, places, out):
             self._check_states(places)
         return out
 
@@ -210,9 +201,7 @@ class Mechanism:
         included)."""
         place, rates = float_array("q", q, (self.nq,)), float_array("v", v, (self.nv,))
         out = np.empty((1, self.nv))
-        if not self._entries.biases_at(
-            self._parts, self._scratch.parts, place[None], rates[None], out
-        ):
+        if not _KERNELS.biases_at(self._parts, self._scratch.parts, place[None], rates[None], out):
             self._place(place)
             self._rates(rates)
         return out[0]
@@ -221,14 +210,14 @@ class Mechanism:
         """Return B (n, d) at each of the n states qs (n, nq), vs (n, d), in one compiled call."""
         places, rates = self._states(qs, vs)
         out = np.empty(rates.shape)
-        if not self._entries.biases_at(self._parts, self._scratch.parts, places, rates, out):
+        if not _KERNELS.biases_at(self._parts, self._scratch.parts, places, rates, out):
             self._check_states(places, rates)
         return out
 
     def gravity(self, q: ArrayLike, g: ArrayLike) -> Floats:
         """Return G(q) (d,), the gradient of the potential energy, for the field g (3,) [m/s^2]."""
         return self._filled(
-            (self.nv,), self._entries.gravity, self._at(q), finite_array("g", g, (3,), "m/s^2")
+            (self.nv,), _KERNELS.gravity, self._at(q), finite_array("g", g, (3,), "m/s^2")
         )
 
     def inverse_dynamics(self, q: ArrayLike, v: ArrayLike, dv: ArrayLike, g: ArrayLike) -> Floats:
@@ -239,21 +228,21 @@ class Mechanism:
             self._rates(dv, "dv"),
             finite_array("g", g, (3,), "m/s^2"),
         )
-        return self._filled((self.nv,), self._entries.inverse_dynamics, *given)
+        return self._filled((self.nv,), _KERNELS.inverse_dynamics, *given)
 
     def point_jacobian(self, q: ArrayLike, body: int | str, point: ArrayLike) -> Floats:
         """Return J (3, d): velocity, in world axes, of the world point [m] regarded as fixed to the
         body."""
         place = finite_array("point", point, (3,), "m")
         return self._filled(
-            (6, self.nv), self._entries.frame_jacobian, self._at(q), self.index(body), place
+            (6, self.nv), _KERNELS.frame_jacobian, self._at(q), self.index(body), place
         )[:3]
 
     def frame_jacobian(self, q: ArrayLike, body: int | str) -> Floats:
         """Return J (6, d): velocity of the body's origin (rows 0-2) and angular velocity (rows
         3-5), in world axes."""
         at, b = self._at(q), self.index(body)
-        return self._filled((6, self.nv), self._entries.frame_jacobian, at, b, at.position[b])
+        return self._filled((6, self.nv), _KERNELS.frame_jacobian, at, b, at.position[b])
 
     def rows_along(
         self, qs: ArrayLike, bodies: ArrayLike, points: ArrayLike, directions: ArrayLike
@@ -279,7 +268,7 @@ class Mechanism:
             raise ArgumentError("bodies", fixed_to, f"numbers from -1 to {len(self.names) - 1}")
         self._check_states(places)
         given = self._scratch.workspace, places, fixed_to, spots, along
-        return self._filled((len(places), self.nv), self._entries.rows_along, *given)
+        return self._filled((len(places), self.nv), _KERNELS.rows_along, *given)
 
     def energies(self, qs: ArrayLike, vs: ArrayLike, g: ArrayLike) -> tuple[Floats, Floats]:
         """Return kinetic and potential energy (n,) [J] at n states, qs (n, nq) and vs (n, d), for
@@ -289,7 +278,7 @@ class Mechanism:
             finite_array("g", g, (3,), "m/s^2"),
             np.zeros((2, len(places))),
         )
-        self._entries.energies_along(
+        _KERNELS.energies_along(
             self.block, self._scratch.workspace, places, rates, field, kinetic, potential
         )
         return kinetic, potential
@@ -311,17 +300,17 @@ class Mechanism:
         """
         places = float_array("qs", qs, (-1, self.nq))
         shape = max(len(places) - 1, 0), self.nv
-        return self._filled(shape, self._entries.displacements_along, places, bool(straight))
+        return self._filled(shape, _KERNELS.displacements_along, places, bool(straight))
 
     def centroidal_momentum(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """Return (6,): momentum [N s] and angular momentum [N m s] about the moving bodies' centre
         of mass."""
-        return self._filled((6,), self._entries.centroidal_momentum, self._at(q), self._rates(v))
+        return self._filled((6,), _KERNELS.centroidal_momentum, self._at(q), self._rates(v))
 
     def _at(self, q: ArrayLike) -> Any:
         """Return this thread's scratch with the kinematics of q; the next call overwrites it."""
         workspace = self._scratch.workspace
-        self._entries.forward_kinematics(self.block, self._place(q), workspace)
+        _KERNELS.forward_kinematics(self.block, self._place(q), workspace)
         return workspace
 
     def _filled(self, shape: tuple[int, ...], kernel: Callable[..., None], *given: Any) -> Floats:
@@ -332,13 +321,13 @@ class Mechanism:
     def _rates(self, v: ArrayLike, name: str = "v") -> Floats:
         """Return a velocity (nv,) of finite numbers, or raise ArgumentError."""
         rates = float_array(name, v, (self.nv,))
-        return rates if self._entries.all_finite(rates) else finite_array(name, v, (self.nv,))
+        return rates if _KERNELS.all_finite(rates) else finite_array(name, v, (self.nv,))
 
     def _place(self, q: ArrayLike, name: str = "q") -> Floats:
         """Return a configuration (nq,) of finite numbers whose quaternions have length one, or
         raise ArgumentError."""
         place = float_array(name, q, (self.nq,))
-        b = self._entries.misplaced_body(self.block, place)
+        b = _KERNELS.misplaced_body(self.block, place)
         if b >= 0:
             finite_array(name, q, (self.nq,))
             first, units = int(self.arrays.q_start[b]), self.bodies[b].joint.layout.coordinate_units

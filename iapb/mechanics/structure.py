@@ -14,7 +14,6 @@ from math import sqrt
 
 import numpy as np
 
-from iapb.compiled import flag
 from iapb.linalg import product
 from iapb.mechanics.bodies import Body
 from iapb.mechanics.joints import FREE_FLYER, PLANAR, SPHERICAL
@@ -51,7 +50,7 @@ def collect_arrays(bodies: tuple[Body, ...], parents: list[int]) -> MechanismArr
         dof_body=np.repeat(np.arange(count), v_count),
         dof_parent=np.array(dof_parent, np.int64),
         dof_rotates=np.array([turns for layout in layouts for turns in layout.rotating], np.bool_),
-        quaternions=flag(any(layout.code in (SPHERICAL, FREE_FLYER) for layout in layouts)),
+        quaternions=any(layout.code in (SPHERICAL, FREE_FLYER) for layout in layouts),
     )
 
 
@@ -208,8 +207,8 @@ def make_free_motion(m: MechanismArrays, tree_of_body: Integers) -> FreeMotion:
             if kind in (FREE_FLYER, PLANAR, SPHERICAL) and (parts.parent[moving[1:]] >= 0).all():
                 found.base[t] = parts.v_count[first]
     return found._replace(
-        turning=flag(bool((found.kind != STRAIGHT).any())),
-        linked=flag(bool((found.kind == LINKAGE).any())),
+        turning=bool((found.kind != STRAIGHT).any()),
+        linked=bool((found.kind == LINKAGE).any()),
     )
 
 

@@ -21,9 +21,7 @@ LONG = ("motions", "solvers", "budgets", "scaling", "robots")  # tables that --j
 
 
 def bench(
-    full: Annotated[
-        bool, typer.Option("--full", help="More repeats and steps, and compile times.")
-    ] = False,
+    full: Annotated[bool, typer.Option("--full", help="More repeats and steps.")] = False,
     budget: Annotated[
         str,
         typer.Option("--budget", help="Name the method for an impact in this time, such as 50us."),

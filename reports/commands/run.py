@@ -12,7 +12,7 @@ import typer
 
 from iapb.advice.checks import check_scene
 from iapb.advice.effects import ignored_fields
-from iapb.compiling import to_stderr
+from iapb.errors import to_stderr
 from iapb.run import INTERRUPTED, Run
 from iapb.scene import Scene, find_scene, load_scene, scene_names
 from iapb.system import System

@@ -8,18 +8,16 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 
-from iapb.compiling import compiling_told, to_stderr
 from iapb.engines import is_engine
-from iapb.errors import ArgumentError
+from iapb.errors import ArgumentError, to_stderr
 from iapb.simulation import Simulation
 from iapb.worlds import find_world
 from reports.commands.run import SceneName, Values, describe, run_as_json, scene_given
 from reports.show import Answer, Json, duration, one_line
 from reports.store.runs import write_run
-from reports.view.loop import Pull, spring, watch
+from reports.view.loop import watch
 from reports.view.page import Page
 
 _LONGEST = 3600.0  # [s] the record of a run is in memory
@@ -53,13 +51,9 @@ def view(
     if is_engine(law.law):
         raise ArgumentError("--world", world, "a contact law: an engine only runs as a whole")
     out.mkdir(parents=True, exist_ok=True)  # an unusable folder is reported before the run
-    with compiling_told(to_stderr):
-        simulation = Simulation(source, law.law, law.coupling_in(source))
-        simulation.prepare()
-        if source.hand is None:
-            to_stderr("The scene has no hand, so nothing can be pulled.")
-        else:  # compile now, so that the first pull does not
-            spring(simulation, Pull(np.zeros(3), np.zeros(3)), np.zeros(6))
+    simulation = Simulation(source, law.law, law.coupling_in(source))
+    if source.hand is None:
+        to_stderr("The scene has no hand, so nothing can be pulled.")
     with closing(Page(source.resolved(), port)) as page:
         to_stderr(f"Open {page.address}")
         if browser:

@@ -27,14 +27,8 @@ from reports.workers import REPORT_WORKERS, executor
 from verification import haptic_rate
 from verification.check import Study
 from verification.claims import peg
-from verification.claims.speed import C19, C22
 from verification.cost import effects
-from verification.cost.accuracy import ACCURACY
-from verification.cost.growth import SCALING
-from verification.cost.solvers import IMPACT_TIMES
-from verification.cost.steps import BODIES, RACES
 from verification.finding import Failure, Finding, attempt
-from verification.hard_cases import judge
 from verification.hard_cases.findings import on_hard_cases
 from verification.proofs import on_proofs
 from verification.proofs.coq import checked
@@ -59,19 +53,9 @@ SHOWN_SCENES = (
 )
 FIGURE_RUNS = "runs of the figures"
 CERTIFIED = "exact-energy"  # the stage that needs all runs of the others
-# The first stages to be computed: one worker compiles the engine for the figures' runs, while the
-# other needs no engine for proofs and the slowest runs. The stages after them are shorter.
+# The first stages to be computed are the longest.
 ON_THE_PEG = "claims on the peg"
 FIRST = ("proofs", ON_THE_PEG, "properties", "claims")
-COMPILED_AHEAD = (
-    C19,
-    C22,
-    ACCURACY,
-    RACES,
-    SCALING,
-    BODIES,
-    IMPACT_TIMES,
-)  # checks whose kernels only they call
 BESIDE = "parts that measure no time"
 
 
@@ -202,7 +186,6 @@ def _compute_beside(stages: dict[str, Stage], out: Path, depth: str, progress: P
             if name == ON_THE_PEG:
                 jobs.append(pool.submit(_slowest_runs, out, depth))
             jobs.append(pool.submit(_fill, stages[name], Runner(out / "runs"), depth, silent))
-        jobs.append(pool.submit(_compile_ahead, out, depth))
         progress(BESIDE, 0, len(jobs))
         for done, job in enumerate(as_completed(jobs), 1):
             stage = job.result()
@@ -219,15 +202,6 @@ def _figure_runs(out: Path) -> None:
     """Simulate the runs of the figures, in a worker; the parent reads them, and tries again those
     that fail."""
     runs.figure_runs(Runner(out / "runs"), silent, [])
-
-
-def _compile_ahead(out: Path, depth: str) -> None:
-    """Compute one case of checks that measure times, in a worker, and drop it: later their kernels
-    are compiled."""
-    study = Study(Runner(out / "runs"), depth)
-    attempt("", judge.warm_up, [])
-    for check in COMPILED_AHEAD:
-        attempt("", lambda check=check: check.table(study, list(check.cases(study))[:1]), [])  # type: ignore[misc]
 
 
 def _slowest_runs(out: Path, depth: str) -> None:

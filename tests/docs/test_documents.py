@@ -104,15 +104,9 @@ def same(a, b):
 
 
 def copy_project(folder):
-    """Copy the packages and scenes; compiled kernels are shared with the original, or every run
-    would recompile."""
-    for name in PACKAGES:
+    """Copy the packages and scenes, with the library of the engine."""
+    for name in (*PACKAGES, "scenes"):
         shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
-        for cache_folder in (ROOT / name).rglob("__pycache__"):
-            (folder / cache_folder.relative_to(ROOT)).symlink_to(
-                cache_folder, target_is_directory=True
-            )
-    shutil.copytree(ROOT / "scenes", folder / "scenes")
 
 
 @pytest.mark.parametrize("name", DOCUMENTS)

@@ -1,22 +1,23 @@
-"""Blocks hand whole rooms of arrays to kernels; kernels cannot allocate, and that is checked by the
-compiler."""
+"""Blocks hand whole rooms of arrays to kernels; a kernel cannot allocate, and Python calls the
+library's kernels."""
 
 from __future__ import annotations
 
-import ast
-import importlib.util
-import pickle
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+import numba
 import numpy as np
 import pytest
 from numba.core.errors import NumbaError
 
-import iapb.run
-from iapb.compiled import Block, _stamped_files, block, flag, kernel
-
-ENGINE = Path(iapb.run.__file__).parent
+from iapb import load_scene, simulate
+from iapb.advice.certificate import certify
+from iapb.bitcode import BlockType, dispatcher_of
+from iapb.compiled import Block, Kernel, block, kinds_of
+from iapb.contact.impact import resolve_frictional_impact, resolve_impact, resolve_impacts
+from iapb.library import library
+from iapb.linalg import cholesky
+from iapb.scene import find_scene
 
 
 def growing_list(x):
@@ -31,21 +32,52 @@ ALLOCATE = [lambda x: np.zeros(3)[0], lambda x: (x + x)[0], growing_list]
 @pytest.mark.parametrize("function", ALLOCATE)
 def test_a_kernel_that_would_allocate_does_not_compile(function):
     with pytest.raises(NumbaError):
-        kernel(function)(np.array([1.0, 2.0, 3.0]))
+        dispatcher_of(function).compile((numba.float64[::1],))
 
 
 @pytest.mark.parametrize(
     "function", [lambda x: x[1:][0], lambda x: (x[0], x[1])[1]]
 )  # neither a slice nor a tuple
 def test_a_kernel_without_allocation_compiles_without_fastmath(function):
-    x = np.array([1.0, 2.0, 3.0])
-    assert (
-        kernel(function)(x) == function(x) and kernel(function).targetoptions["fastmath"] is False
-    )
+    dispatcher = dispatcher_of(function)
+    dispatcher.compile((numba.float64[::1],))
+    assert dispatcher.overloads and dispatcher.targetoptions["fastmath"] is False
 
 
-# --- blocks
-# -----------------------------------------------------------------------------------------------------------
+@numba.njit
+def largest_pivot(matrix, lower):
+    cholesky(matrix, lower)
+    return lower[0, 0]
+
+
+def test_a_kernel_of_a_user_calls_those_of_the_engine():
+    assert largest_pivot(np.diag([9.0, 4.0]), np.zeros((2, 2))) == 3.0
+
+
+def test_a_kernel_runs_as_python_for_kinds_of_arguments_that_the_library_has_not():
+    lower = np.zeros((2, 2), np.float32)
+    assert cholesky(np.diag([9.0, 4.0]).astype(np.float32), lower) == 0 and lower[1, 1] == 2.0
+    assert library().entry(cholesky.name, kinds_of([lower, lower])) is None
+
+
+def test_python_calls_the_library_alone(monkeypatch):
+    """Else a kernel would run as Python, a hundred times as slow, with nobody the wiser."""
+    as_python = []
+
+    def find(kernel, kinds):
+        found = library().entry(kernel.name, kinds)
+        if found is None:
+            as_python.append(f"{kernel.name}({kinds})")
+        return found or kernel.function
+
+    monkeypatch.setattr(Kernel, "find", find)
+    for name in ("peg_corner", "peg_hole_space", "arm_pushing", "three_link_arm_elastic"):
+        certify(simulate(load_scene(find_scene(name)), steps=400))
+    matrix, v = np.eye(2), np.array([-1.0, -1.0])
+    resolve_impact(matrix, matrix, v, [0.5, 0.25])
+    resolve_impacts(matrix[None], matrix[None], v[None], 0.5)
+    resolve_frictional_impact(matrix, matrix[:1], matrix[1:], v, 0.5, 0.1)
+    assert as_python == []
 
 
 class Inner(NamedTuple):
@@ -57,11 +89,6 @@ class Outer(NamedTuple):
     count: int
     inner: Inner
     small: np.ndarray
-
-
-@kernel
-def read(b):
-    return b.inner.table[-1, -1] + b.small[0] + b.inner.flag
 
 
 def outer(**values):
@@ -76,7 +103,7 @@ def outer(**values):
 def test_a_block_keeps_its_arrays_alive():
     made = block(outer(inner=Inner(True, np.ones((60, 60)))))
     churn = [np.full(3600, np.nan) for _ in range(200)]
-    assert len(churn) == 200 and read(made) == 9.0
+    assert len(churn) == 200 and made.inner.table[-1, -1] == 1.0
 
 
 def test_a_block_is_made_once_and_has_the_names_of_its_content_alone():
@@ -85,77 +112,11 @@ def test_a_block_is_made_once_and_has_the_names_of_its_content_alone():
     with pytest.raises(AttributeError):
         made.nothing  # noqa: B018
     with pytest.raises(NumbaError, match="nothing"):
-        kernel(lambda b: b.nothing)(made)
+        dispatcher_of(lambda b: b.nothing).compile((numba.typeof(made),))
 
 
-def test_types_of_blocks_differ_where_their_fields_do_and_survive_a_file():
+def test_kinds_of_blocks_differ_where_their_members_do():
     same, other = block(outer()), block(outer(small=np.array([300], np.int64)))
-    assert block(outer(count=9, inner=Inner(False, np.ones((5, 1))))).block_type == same.block_type
-    assert other.block_type != same.block_type
-    assert read(other) == 306.0  # compiled anew, with another width
-    assert pickle.loads(pickle.dumps(same.block_type)) == same.block_type
-
-
-def test_the_stamp_of_kernels_covers_every_file_whose_constants_they_read():
-    """Else a changed constant would leave the machine code made with the old one in use."""
-    stamped = set(_stamped_files())
-    assert stamped >= {
-        ENGINE / name for name in ("contact/geometry.py", "run.py", "compiled.py", "inlining.py")
-    }
-    for path in stamped:
-        for node in ast.walk(ast.parse(path.read_text())):
-            constants = [
-                name.name
-                for name in getattr(node, "names", ())
-                if isinstance(node, ast.ImportFrom)
-                and str(node.module).startswith("iapb")
-                and name.name.lstrip("_").isupper()
-            ]
-            home = ENGINE.parent.joinpath(*str(getattr(node, "module", "")).split(".")).with_suffix(
-                ".py"
-            )
-            assert home in stamped or set(constants) <= {"FORCES"}, (
-                path,
-                constants,
-            )  # those Python reads
-
-
-def test_a_kernel_outside_the_engine_is_compiled_anew_when_its_own_file_changes(tmp_path):
-    path, x = tmp_path / "own_kernel.py", np.array([2.0])
-    for factor in (3.0, 5.0):
-        path.write_text(
-            f"from iapb.compiled import kernel\n\n\n@kernel\ndef scaled(x):\n    return {factor} * x[0]\n"
-        )
-        spec = importlib.util.spec_from_file_location("own_kernel", path)
-        module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
-        assert module.scaled(x) == factor * 2.0
-
-
-class Flags(NamedTuple):
-    first: Any
-    second: Any
-
-
-@kernel(needs="first second", otherwise=-1)
-def needing(flags, x):
-    return x
-
-
-@kernel
-def calling(flags, x):
-    return needing(flags, x) + (10 if flags.first else 0)
-
-
-@pytest.mark.parametrize("how", ["lean", "whole"])
-def test_a_kernel_whose_flags_are_all_off_is_not_compiled(
-    how: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("IAPB_COMPILE", how)
-    found = {
-        (a, b): calling(block(Flags(flag(a), flag(b))), 3)
-        for a in (False, True)
-        for b in (False, True)
-    }
-    off = -1 if how == "lean" else 3
-    assert found == {(False, False): off, (False, True): 3, (True, False): 13, (True, True): 13}
+    assert block(outer(count=9, inner=Inner(False, np.ones((5, 1))))).kind_name == same.kind_name
+    assert other.kind_name != same.kind_name
+    assert isinstance(numba.typeof(same), BlockType) and numba.typeof(same) != numba.typeof(other)

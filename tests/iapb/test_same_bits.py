@@ -1,9 +1,5 @@
 """The engine gives the same bits with any BLAS kernel, any instruction set of numpy, any code of
-the C library.
-
-Machine code of the kernels for another processor (`NUMBA_CPU_NAME=generic`) takes minutes to
-compile: not here.
-"""
+the C library."""
 
 from __future__ import annotations
 

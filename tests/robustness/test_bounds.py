@@ -88,7 +88,7 @@ def program(*words, **environment):
         [sys.executable, "-m", "tests.robustness.test_bounds", str(COUNT), *words],
         text=True,
         capture_output=True,
-        env=os.environ | {"IAPB_COMPILE": "whole"} | environment,
+        env=os.environ | environment,
     )
     assert done.returncode == 0, done.stderr[-2000:]
     return done.stdout.splitlines()

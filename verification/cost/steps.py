@@ -17,7 +17,8 @@ import numpy as np
 
 from iapb.contact.kernels.broadphase import near_pairs
 from iapb.errors import installing
-from iapb.recording import Recorder, make_record
+from iapb.loop import make_record
+from iapb.recording import Recorder
 from iapb.scene import scene_from_text
 from iapb.scene.mechanism import start_of
 from iapb.simulation import Simulation
@@ -49,7 +50,6 @@ class RecordedLoop:
         simulation, system = self.simulation, self.simulation.system
         simulation.state, simulation.steps_done = system.make_state(), 0
         simulation.port = system.make_port(simulation.coupling)
-        simulation.prepare()  # the timed calls contain steps only
         self.recording = Recorder(simulation)
         total = 0.0
         while self.recording.steps < self.steps:

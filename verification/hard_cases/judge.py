@@ -18,7 +18,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from functools import cache, partial
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,7 +26,7 @@ import numpy as np
 from iapb import resolve_frictional_impact, resolve_impact
 from iapb.errors import IapbError, RangeError
 from iapb.run import Run
-from iapb.scene import Scene, find_scene, load_scene, scene_from_text
+from iapb.scene import Scene, scene_from_text
 from iapb.scene.mechanism import mechanism_of
 from iapb.simulation import simulate
 from reference.exact import fractions_of, rational_matrix, relative_energy_gain
@@ -124,15 +124,8 @@ def judge_hard_case(case: AnyCase, method: str, simulate: Simulate = run_in_worl
     )
 
 
-@cache
-def _compile_step() -> None:
-    """Compile the step before the timed runs."""
-    simulate(load_scene(find_scene("two_discs")), steps=1)
-
-
 def _judge_motion(case: TrajectoryCase, world: str, simulate: Simulate) -> Row:
     """Return the row of one world on one motion."""
-    _compile_step()
     try:
         run = (run_in_world if world == COULOMB else simulate)(case.scene, world)
     except IapbError as error:
@@ -307,7 +300,6 @@ def faulty_answers(case: HardCase, v_plus: Floats) -> list[Floats]:
 
 def _answer(case: HardCase, method: str) -> Answer:
     """Return an answer with the median time of a few calls."""
-    warm_up()
     first = resolve_once(case, method)
     if first.seconds >= _SLOW:
         return first
@@ -338,13 +330,6 @@ def resolve_once(case: HardCase, method: str) -> Answer:
     if method in COMPARED and not np.isfinite(velocity).all():
         raise RangeError("velocity", f"{method} works on the numbers as given")
     return Answer(velocity, rank, seconds)
-
-
-@cache
-def warm_up() -> None:
-    """Compile the kernels before the timed calls."""
-    resolve_impact([[1.0]], [[1.0]], [-1.0], 0.5)
-    resolve_impact(np.eye(2), np.eye(2), [-1.0, -1.0], [0.5, 0.25])
 
 
 def _unmet(case: HardCase, v_plus: Floats) -> float:

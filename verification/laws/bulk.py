@@ -14,11 +14,8 @@ import numpy as np
 
 from iapb import resolve_impacts
 from iapb.advice.certificate import judge_gains
-from iapb.compiled import block, copy_into, kernel
-from iapb.contact.kernels.impact import ImpactWork, factored_impact, rank_tolerance, whiten_impact
-from iapb.contact.kernels.passive import gain
-from iapb.double_double import kinetic_energies
-from iapb.linalg import cholesky
+from iapb.compiled import block
+from iapb.contact.kernels.impact import ImpactWork, factored_impacts
 from iapb.schema import zeros_of
 from reference.exact import bulk_energy_gain
 from reference.one_thread import one_thread
@@ -192,43 +189,15 @@ def resolved(given: Impacts, clamped: bool = True, *, scale: bool = False) -> tu
             given.mass, given.columns.transpose(0, 2, 1), given.v, given.restitution, clamp=clamped
         )
         return found.velocity, found.clamp
-    d, c = given.columns.shape[1:]
-    v_plus, clamps = np.empty_like(given.v), np.empty(len(given.v))
+    n, d, c = given.columns.shape
+    v_plus, clamps = np.empty((n, d)), np.empty(n)
     work = block(zeros_of(ImpactWork, velocity=d, row=c))
-    _resolve_all(*given[:4], clamped, work, v_plus, clamps)
+    factored_impacts(*given[:4], d, clamped, 1, work, v_plus, clamps)
     return v_plus, clamps
-
-
-@kernel
-def _resolve_all(mass, columns, v, restitution, clamped, work, v_plus, clamps):  # type: ignore[no-untyped-def]
-    n, d, c = columns.shape
-    for k in range(n):
-        for i in range(d):
-            copy_into(work.mass[i], mass[k, i])
-            copy_into(work.columns[i], columns[k, i])
-        if cholesky(mass[k], work.lower) != 0:
-            clamps[k] = -1.0
-            copy_into(v_plus[k], v[k])
-            continue
-        copy_into(work.v, v[k])
-        whiten_impact(d, c, work)
-        clamps[k] = factored_impact(
-            d, c, restitution[k], rank_tolerance(work.lower), d, clamped, work
-        )[1]
-        copy_into(v_plus[k], work.v_plus)
-
-
-@kernel
-def _relative_losses(masses, v, v_plus, lost):  # type: ignore[no-untyped-def]
-    """Write (KE⁻ − KE⁺)/KE⁻, computed in double-double and rounded once, into `lost`."""
-    for k in range(v.shape[0]):
-        high, low, _, _ = gain(masses[k], v[k], v_plus[k])
-        lost[k] = -0.25 * (high + low) / kinetic_energies(masses[k], v[k], v_plus[k])[0]
 
 
 def _losses(given: Impacts, v_plus: Floats) -> Floats:
     """Return the relative losses of the elastic impacts, divided by 10 d ε √κ."""
-    lost, elastic = np.empty(len(v_plus)), given.restitution == 1.0
-    _relative_losses(given.mass, given.v, v_plus, lost)
+    lost, elastic = -bulk_energy_gain(given.mass, given.v, v_plus)[0], given.restitution == 1.0
     bound = 10.0 * v_plus.shape[1] * EPS * np.sqrt(given.condition)
     return np.asarray((lost / bound)[elastic], np.float64)

@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from iapb.compiling import compiling_told, to_stderr
 from iapb.errors import ArgumentError
 from iapb.names import one_of
 from reference.one_thread import one_thread
@@ -267,7 +266,6 @@ def residual_of(
         return LawResidual("", np.inf, 0.0), str(fault)
 
 
-@compiling_told(to_stderr)
 def check_passivity(
     resolver: Resolver,
     *,

@@ -17,7 +17,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from iapb.compiled import flag, kernel
+from iapb.compiled import kernel
 from iapb.contact.geometry import ENDLESS, HALF_SPACE, POLYGON, Shapes
 from iapb.linalg import add, dot, load, store, subtract, transform
 from iapb.schema import Floats, Indices, Integers, States, blank, quantities
@@ -49,7 +49,7 @@ class BroadPhase(NamedTuple):
     next: Annotated[Integers, "moving"]  # another one in the same bucket, −1 = none
     key: Annotated[Integers, "pair"]
     pairs: Annotated[Indices, "pair 2"]  # output
-    used: Any  # whether there are enough candidate pairs (`iapb.compiled.flag`)
+    used: bool  # whether there are enough candidate pairs
 
 
 def make_broad_phase(shapes: Shapes, pairs: Indices) -> BroadPhase:
@@ -78,7 +78,7 @@ def make_broad_phase(shapes: Shapes, pairs: Indices) -> BroadPhase:
         static,
         shapes.body[:n].copy(),
         **arrays,
-        used=flag(len(pairs) > 0),
+        used=len(pairs) > 0,
         cell_size=float(2.0 * arrays["radius"][moving].max(initial=0.0)) or 1.0,
         neighbours=27 if np.any(shapes.kind >= HALF_SPACE) else 9,
     )
@@ -100,7 +100,7 @@ def _bounding_sphere(shapes: Shapes, i: int) -> tuple[Any, float]:
 LARGEST_CELL = 2**40  # cell number of distant coordinates; int64 holds this cell and its neighbours
 
 
-@kernel(needs="used", otherwise=0)
+@kernel
 def near_pairs(broad, R, p, margin):
     """Write the pairs that may have gap <= margin to `broad.pairs`; return how many, -1 if they do
     not fit."""

@@ -133,7 +133,7 @@ def apply_group(state, size, share):
     return lost, share
 
 
-@kernel(needs="unequal_restitution pushing supports", otherwise=(0, 1.0, False))
+@kernel
 def resolve_unequal(world, state, size, count, smallest, tolerance):
     """Apply Poisson's law to rows of unequal e; if it fails, the scalar rule with the smallest e,
     which is passive."""
@@ -147,7 +147,7 @@ def resolve_unequal(world, state, size, count, smallest, tolerance):
     return rank, clamp, solved
 
 
-@kernel(needs="impact_friction", otherwise=(1.0, 1.0, True))
+@kernel
 def add_friction_to_impact(world, state, size, count, rank, only_push):
     """Add friction to the normal impact; return (share kept, clamp, whether Coulomb's law is
     met)."""
@@ -164,7 +164,7 @@ def add_friction_to_impact(world, state, size, count, rank, only_push):
     )
 
 
-@kernel(needs="impact_friction", otherwise=None)
+@kernel
 def gather_tangents(world, state, size, count):
     """Write μ of each contact and the tangents' rows of J."""
     contacts, f = state.contacts, state.friction_work
@@ -209,7 +209,7 @@ def keep_together(state, size, count):
     return kept
 
 
-@kernel(needs="impact_friction", otherwise=(0, 1.0, 1.0, True))
+@kernel
 def push_with_friction(world, state, size, count, smallest, tolerance):
     """Resolve contacts that only push, with friction; return (rank, clamp, share of friction,
     solved).
@@ -334,7 +334,7 @@ def resolve_collisions(world, state):
         collide = strike_again(world, state)
 
 
-@kernel(needs="implicit", otherwise=False)
+@kernel
 def strike_again(world, state):
     """Find the contacts of colliding groups that impacts have made approach; return False if there
     are none.

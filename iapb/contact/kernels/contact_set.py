@@ -43,7 +43,7 @@ def same_surface(first, i, second, j):
     )
 
 
-@kernel(needs="clustering", otherwise=0)
+@kernel
 def cluster(world, contacts, count):
     """Collapse contacts of one surface closer than `cluster_distance` into the deepest; return how
     many stay.
@@ -248,7 +248,7 @@ def pair_restitution(world, contacts, i):
     return world.restitution if e > 1.0 else e
 
 
-@kernel(needs="implicit")
+@kernel
 def add_supports(world, state):
     """Mark what strikes; of a colliding group, contacts that carry a load enter the impact, too.
 

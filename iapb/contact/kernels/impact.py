@@ -6,12 +6,13 @@ from __future__ import annotations
 import math
 from typing import Annotated, NamedTuple
 
-from iapb.compiled import kernel
+from iapb.compiled import copy_into, kernel
 from iapb.contact.kernels.passive import UNIT, passive_step, write_step
 from iapb.contact.kernels.row_basis import orthonormal_basis
 from iapb.double_double import add_product, symmetric_entry
 from iapb.linalg import (
     add_multiple,
+    cholesky,
     dot_of,
     from_whitened,
     to_momentum,
@@ -134,6 +135,30 @@ def apply_change(d, clamped, work):
         work.change[k] *= alpha
     to_momentum(work.lower, work.change[:d], work.momentum)
     return alpha
+
+
+@kernel
+def factored_impacts(
+    masses, columns, velocities, restitution, budget, clamped, times, work, v_plus, clamps
+):
+    """Resolve n impacts in factored form, in their own units, as a step does, each `times` times.
+
+    masses (n, d, d), columns (n, d, c): rows of J as columns, velocities (n, d), restitution (n,).
+    Writes v⁺ (n, d) and the clamps (n,): where M is not positive definite, v⁺ = v and −1.
+    """
+    n, d, c = columns.shape
+    for m in range(n):
+        for _ in range(times):
+            clamps[m] = -1.0
+            for i in range(d):
+                copy_into(work.mass[i], masses[m, i])
+                copy_into(work.columns[i], columns[m, i])
+                work.v[i] = work.v_plus[i] = velocities[m, i]
+            if cholesky(work.mass, work.lower) == 0:
+                whiten_impact(d, c, work)
+                least = rank_tolerance(work.lower)
+                _, clamps[m] = factored_impact(d, c, restitution[m], least, budget, clamped, work)
+        copy_into(v_plus[m], work.v_plus)
 
 
 # Refinement of an impact for M itself, where Cholesky's backward error L Lᵀ ≠ M affects the result.

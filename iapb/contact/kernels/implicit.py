@@ -87,7 +87,7 @@ class RestWork(NamedTuple):
     shortened: Annotated[Integers, "1"]  # solutions that were shortened, since the start
 
 
-@kernel(needs="implicit")
+@kernel
 def rest_implicitly(world, state, rubs):
     """Give v the forces of all resting contacts; write them to the contacts, to penalty_force and
     friction_force."""

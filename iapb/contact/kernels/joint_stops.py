@@ -21,7 +21,7 @@ def is_stop(contacts, i):
     return contacts.shape_a[i] == contacts.shape_b[i]
 
 
-@kernel(needs="joint_limits", otherwise=0)
+@kernel
 def add_stops(world, state, contacts, count):
     """Append the stops that are reached after `count` contacts; return the new count, −1 if there
     is no room."""

@@ -99,7 +99,7 @@ def vertices_half_plane(shapes, a, b, R, p, margin, buffer, count):
     return count
 
 
-@kernel(needs="polygons", otherwise=-1)
+@kernel
 def circle_polygon(shapes, circle, polygon, circle_is_a, R, p, margin, buffer, count):
     """Write the contact of a circle and a convex polygon, at the polygon's nearest edge or vertex.
 
@@ -164,7 +164,7 @@ def circle_polygon(shapes, circle, polygon, circle_is_a, R, p, margin, buffer, c
 ROUNDING_SHARE = 1e-12
 
 
-@kernel(needs="polygons", otherwise=-1)
+@kernel
 def polygons(shapes, a, b, R, p, margin, buffer, count):
     """Write the contacts (two at most) of convex polygons a and b; comments above describe the
     method."""

@@ -65,31 +65,31 @@ class ResolveWork(NamedTuple):
     friction: FrictionWork
 
 
+class Batch(NamedTuple):
+    """n impacts of equal size, scratch for one, and what they write."""
+
+    masses: np.ndarray  # (n, d, d)
+    jacobians: np.ndarray  # (n, c, d)
+    velocities: np.ndarray  # (n, d)
+    restitution: np.ndarray  # (n,) for (21) in factored form
+    unequal: np.ndarray  # (n, c) of each contact, for Poisson's law in place of (21), or (0, c)
+    tangents: np.ndarray  # (n, c m, d) for Coulomb's friction, added to (21), or (0, c m, d)
+    friction: np.ndarray  # (n, c) likewise
+    work: ResolveWork
+    out: Results
+
+
 @kernel
-def resolve_each(
-    masses,
-    jacobians,
-    velocities,
-    restitution,
-    unequal,
-    tangents,
-    friction,
-    tolerance,
-    budget,
-    clamped,
-    work,
-    out,
-):
+def resolve_each(batch, tolerance, budget, clamped):
     """Resolve n impacts in the caller's units; return the number of the first without a result, n
     if there is none.
 
-    unequal : (n, c) restitution of each contact, by Poisson's law; None: `restitution` (n,), by
-        (21) in factored form.
-    tangents (n, c m, d), friction (n, c) : Coulomb's friction, added to (21), or None.
-    tolerance : rank tolerance of the rows; 0 selects the default.  out : `Results`
+    tolerance : rank tolerance of the rows; 0 selects the default.
     """
-    n, c, d = jacobians.shape
-    impact, f = work.impact, work.friction
+    n, c, d = batch.jacobians.shape
+    masses, jacobians, velocities = batch.masses, batch.jacobians, batch.velocities
+    work, out, rubs = batch.work, batch.out, batch.tangents.shape[0] > 0
+    impact, f, pushes = work.impact, work.friction, batch.unequal.shape[0] > 0
     for m in range(n):
         v_plus, momentum, p, p_t = (
             out.velocity[m],
@@ -98,31 +98,33 @@ def resolve_each(
             out.tangential[m],
         )
         out.numbers[m, 1] = REFUSED
-        sound, k, rounded = scale_impact(
-            masses[m], jacobians[m], velocities[m], tangents is None, work
-        )
+        sound, k, rounded = scale_impact(masses[m], jacobians[m], velocities[m], not rubs, work)
         if not sound:
             return m
         whiten_impact(d, c, impact)
         share, status = 1.0, COMPLETE
-        if unequal is not None:
-            rank, clamp = poisson_impact(d, c, unequal[m], clamped, impact, work.push, p)
+        if pushes:
+            rank, clamp = poisson_impact(d, c, batch.unequal[m], clamped, impact, work.push, p)
             if rank < 0:
                 out.numbers[m, 1] = NOT_CONVERGED
                 return m
             status = COMPLETE if clamp >= 1.0 - _UNSOLVED else NOT_SOLVED
         else:
             least = tolerance if tolerance > 0.0 else rank_tolerance(impact.lower)
-            rank, clamp = factored_impact(d, c, restitution[m], least, budget, clamped, impact)
+            rank, clamp = factored_impact(
+                d, c, batch.restitution[m], least, budget, clamped, impact
+            )
             for i in range(c if rank == budget and rank < d else 0):
                 status = BUDGET if impact.size[i] > least * least else status
-            if tangents is None:
+            if not rubs:
                 least_norm_impulses(d, c, rank, work, p)
             else:
                 for j in range(p_t.shape[0]):
                     for i in range(d):
-                        f.rows[j, i] = np.ldexp(tangents[m, j, i], work.coordinate_exponent[i])
-                copy_into(f.coefficient[:c], friction[m])
+                        f.rows[j, i] = np.ldexp(
+                            batch.tangents[m, j, i], work.coordinate_exponent[i]
+                        )
+                copy_into(f.coefficient[:c], batch.friction[m])
                 share, factor, met = add_impact_friction(d, c, rank, impact, work.push, f, False, p)
                 clamp *= factor
                 status = COMPLETE if met else REDUCED
@@ -138,7 +140,7 @@ def resolve_each(
             and math.isfinite(out.numbers[m, 2])
         ):
             return m
-        if unequal is not None and not separates(jacobians[m], velocities[m], v_plus):
+        if pushes and not separates(jacobians[m], velocities[m], v_plus):
             status = NOT_SOLVED
         out.numbers[m, 0], out.numbers[m, 1] = (
             rank,

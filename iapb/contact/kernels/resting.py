@@ -35,7 +35,7 @@ def friction_share(normal_force, speed, friction, friction_velocity):
     return -friction * normal_force / reach
 
 
-@kernel(needs="explicit")
+@kernel
 def resting_force(world, state, contacts, i):
     """Add the forces (4) of contact i to those of the step, as generalized forces Jᵀ F.
 

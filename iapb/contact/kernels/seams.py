@@ -19,7 +19,7 @@ _LARGEST_SAG = 5e-5
 _SAME_NORMAL = 1.0 - 5e-7  # cosine of 1e-3 rad: such a contact carries the body, too
 
 
-@kernel(needs="supports", otherwise=0)
+@kernel
 def leave_out_seams(world, state, count):
     """Drop new contacts of pairs that the sag of a resting contact explains; return how many
     contacts stay."""

@@ -83,7 +83,7 @@ def world_axes(shapes, shape, R):
     )
 
 
-@kernel(needs="balls", otherwise=-1)
+@kernel
 def balls(shapes, a, b, R, p, margin, buffer, count):
     """Write the contact of two circles or two spheres: gap = distance of centres - both radii.
 

@@ -23,7 +23,7 @@ from iapb.contact.kernels.shape_frames import (
 from iapb.linalg import add, cross, dot, load, scale, subtract
 
 
-@kernel(needs="space", otherwise=0)
+@kernel
 def spatial_pair(shapes, a, b, R, p, margin, buffer, count):
     """Write the contacts of two spatial shapes, not both spheres; a half-space is always b."""
     if shapes.kind[b] == HALF_SPACE:

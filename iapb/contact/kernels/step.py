@@ -221,7 +221,7 @@ def drift(world, state, applied):
     return True
 
 
-@kernel(needs="linked")
+@kernel
 def coriolis(world, state):
     """acceleration <- −M⁻¹ B at the present state."""
     bias(world.mechanism, state.body, state.v, state.bias)
@@ -232,7 +232,7 @@ def coriolis(world, state):
     )
 
 
-@kernel(needs="linked", otherwise=True)
+@kernel
 def swing(world, state, h):
     """Move the linkages by h [s]: velocity Verlet, then the root's momentum and the energy are
     those before."""
@@ -331,7 +331,7 @@ def add_to_falling_trees(world, state, applied, vector, factor):
             add_multiple(vector[start:stop], factor, state.bias[start:stop])
 
 
-@kernel(needs="joint_damping", otherwise=True)
+@kernel
 def damp_joints(world, state):
     """Solve (M + Δt D) v⁺ = M v for damped trees, D diagonal; −D v⁺ into `acceleration`. False: not
     definite.

@@ -68,8 +68,7 @@ class World(NamedTuple):
     gravity: np.ndarray  # (3,) [m/s²]
     stiffness: float  # K [N/m] (5)
     damping: float  # B [N s/m] (5)
-    implicit: bool  # resting forces implicit in the velocity
-    explicit: bool  # resting forces are the paper's explicit (5)
+    implicit: bool  # resting forces implicit in the velocity; else the paper's explicit (5)
     tangents: int  # of a contact: 1 in the plane, 2 in space
     clamped: bool  # F_n >= 0; False: (5) as printed, may pull
     friction_class: np.ndarray  # (shapes + stops,) int64

@@ -3,7 +3,7 @@ thread)."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -28,7 +28,7 @@ class MechanismArrays(NamedTuple):
     dof_body: Integers  # (d,) body that the dof moves
     dof_parent: Integers  # (d,) dof before it on the path from the world, -1 = none
     dof_rotates: Booleans  # (d,) turns about its axis; otherwise moves along it
-    quaternions: Any  # whether a joint has one (`iapb.compiled.flag`)
+    quaternions: bool  # whether a joint has one
 
 
 class Workspace(NamedTuple):

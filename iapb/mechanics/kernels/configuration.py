@@ -42,7 +42,7 @@ def turn_quaternion(q, i, phi, out):
     out[i + 3] = scalar / length
 
 
-@kernel(needs="quaternions")
+@kernel
 def integrate_in_space(m, b, q, v, dt, out):
     """Turn a spherical joint; a free flyer moves as p += R (1 + A [phi]x + B [phi]x^2) u, and R
     turns by phi.
@@ -114,7 +114,7 @@ def quaternion_difference(q0, q1, i):
     return scale(factor, vector)
 
 
-@kernel(needs="quaternions")
+@kernel
 def difference_in_space(m, b, q0, q1, out):
     """Write the velocity of body b, which has a quaternion, from q0 to q1.
 

@@ -120,7 +120,7 @@ def fly(m, free, t, q, v, dt):
     q[i], q[i + 1], q[i + 2] = q[i] + path[0], q[i + 1] + path[1], q[i + 2] + path[2]
 
 
-@kernel(needs="turning")
+@kernel
 def move_simple_trees(m, free, tree_of_body, q, v, dt):
     """Move all trees but linkages for dt [s]."""
     for b in range(m.kind.shape[0]):
@@ -135,7 +135,7 @@ def move_simple_trees(m, free, tree_of_body, q, v, dt):
                 turn_freely(free, t, q, m.q_start[b], v, m.v_start[b], dt)
 
 
-@kernel(needs="linked", otherwise=1)
+@kernel
 def parts_of_linkages(m, free, start, stop, v, dt):
     """Return the number of equal parts in which linkages move over the step, by their fastest
     rotating joint."""

@@ -1,0 +1,144 @@
+"""The loop of a simulation as one kernel, which does many steps or parts of one, and its record."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from iapb.compiled import Entry, block, copy_into, kernel
+from iapb.contact.kernels.step import STATUS_TEXT, advance, contact_state
+from iapb.haptics.rendering import NO_COUPLING, couple, move_device, render
+from iapb.linalg import load, store
+from iapb.run import ContactTable, ImpactTable, Run
+from iapb.schema import Quantity, blank, quantities
+
+DEVICE_NOT_FINITE = 1 + max(STATUS_TEXT)
+FAILURES = STATUS_TEXT | {
+    DEVICE_NOT_FINITE: "the device's motion left the range of numbers: the step is too long "
+    "for this coupling and delay"
+}
+
+COUPLE, ADVANCE, RENDER, MOVE, WRITE = 1, 2, 4, 8, 16  # parts of a step
+WHOLE = COUPLE | ADVANCE | RENDER | MOVE | WRITE
+
+# Arrays that the loop writes; poses, energies and digests of M are computed from them.
+STATES = tuple(each for each in quantities(Run, "time") if each.name != "pose")
+STEPS = (
+    *quantities(Run, "step"),
+    Quantity("contact_count", ("step",), np.int64, "1", "contacts of the step"),
+)
+CONTACTS = quantities(ContactTable, "contact")
+IMPACTS = tuple(each for each in quantities(ImpactTable) if each.name != "mass_digest")
+LINES = {"steps": STATES + STEPS, "contacts": CONTACTS, "impacts": IMPACTS}
+
+Coordinates = tuple[int, int, int, int]
+
+
+class Record(NamedTuple):
+    """Memory for up to n steps of at most c contacts and t trees, with the names of `iapb.run`."""
+
+    used: np.ndarray  # (3,) int64: steps, contacts and impacts written so far
+    steps: Any  # n lines, with the states at the *end* of each step
+    contacts: Any  # n c lines
+    impacts: Any  # n t lines, one per island and step
+
+
+def make_record(steps: int, coordinates: Coordinates, contacts: int, trees: int) -> Any:
+    """Allocate a record; `coordinates` = (nq, d, nq_t, d_t)."""
+    lengths = {
+        "time": steps,
+        "step": steps,
+        "contact": steps * contacts,
+        "impact": steps * trees,
+        "axis": 3,
+    }
+    lengths |= zip(
+        ("coordinate", "velocity", "device_coordinate", "device_velocity"), coordinates, strict=True
+    )
+    return block(
+        Record(
+            np.zeros(3, np.int64),
+            **{name: blank(listed, lengths, np.empty) for name, listed in LINES.items()},
+        )
+    )
+
+
+@kernel
+def write_step(record, k, step, state, port):
+    """Copy step number `step` into line k of the record."""
+    line = record.steps
+    for i in range(state.q.shape[0]):
+        line.q[k, i] = state.q[i]
+    for i in range(
+        state.v.shape[0]
+    ):  # one loop: eight short ones would cost more than what they copy
+        line.v[k, i] = state.v[i]
+        line.hand_force[k, i] = port.hand_force[i]
+        line.coupling_force[k, i] = port.coupling_force[i]
+        line.penalty_force[k, i] = state.penalty_force[i]
+        line.friction_force[k, i] = state.friction_force[i]
+        line.impulse[k, i] = state.impulse[i]
+        line.environment_force[k, i] = port.environment_force[i]
+    for i in range(port.device_q.shape[0]):
+        line.device_q[k, i] = port.device_q[i]
+    for i in range(port.device_v.shape[0]):
+        line.device_v[k, i] = port.device_v[i]
+        line.device_force[k, i] = port.device_force[i]
+    line.state[k] = contact_state(state, port.tool_tree)
+    line.contact_count[k] = state.contact_count[0]
+    record.used[0] = k + 1
+    _write_tables(record, step, state)
+
+
+@kernel
+def _write_tables(record, step, state):
+    line, contacts, m = record.contacts, state.contacts, record.used[1]
+    for i in range(state.contact_count[0]):
+        line.body_a[m], line.body_b[m] = contacts.body_a[i], contacts.body_b[i]
+        store(line.point, m, load(contacts.point, i))
+        store(line.normal, m, load(contacts.normal, i))
+        store(line.friction_force, m, load(contacts.friction_force, i))
+        line.gap[m], line.normal_velocity[m] = contacts.gap[i], contacts.normal_velocity[i]
+        line.normal_force[m] = contacts.normal_force[i]
+        line.impulse[m], line.is_new[m] = state.contact_impulse[i], contacts.is_new[i]
+        m += 1
+    record.used[1] = m
+    impact, log, m = record.impacts, state.impacts, record.used[2]
+    for i in range(log.logged[0]):
+        impact.step[m], impact.group[m] = step, log.group[i]
+        impact.rows[m], impact.rank[m] = log.rows[i], log.rank[i]
+        impact.scale[m], impact.clamp[m] = log.scale[i], log.clamp[i]
+        impact.energy_lost[m], impact.friction_share[m] = log.energy_lost[i], log.friction_share[i]
+        impact.approaching[m], impact.solved[m] = log.approaching[i], log.solved[i]
+        copy_into(impact.v_minus[m], log.v_minus[i])
+        copy_into(impact.v_plus[m], log.v_plus[i])
+        copy_into(impact.impulse[m], log.impulse[i])
+        m += 1
+    record.used[2] = m
+
+
+@kernel
+def steps_of_loop(world, state, port, record, parts, first, steps):
+    """Do `steps` steps of an engine law, or parts of them; return the number of steps done and the
+    status."""
+    line = record.used[0]
+    for k in range(steps):
+        if parts == WHOLE and port.planned.shape[0] > 0:
+            copy_into(port.wrench, port.planned[k])
+        if parts & COUPLE:
+            couple(world, state, port)
+        if parts & ADVANCE:
+            status = advance(world, state, port.applied)
+            if status:
+                return k, status
+        if parts & RENDER:
+            render(world, state, port)
+        if parts & MOVE and port.coupling != NO_COUPLING and not move_device(world, state, port):
+            return k, DEVICE_NOT_FINITE
+        if parts & WRITE:
+            write_step(record, line + k, first + k, state, port)
+    return steps, 0
+
+
+run_steps = Entry(steps_of_loop)

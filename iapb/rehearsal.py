@@ -1,0 +1,125 @@
+"""A rehearsal of the engine before its library is compiled: which kernels Python calls, and how.
+
+Everything that Python asks of the engine happens once here, in a scene as small as possible, with
+kernels that run as Python. The outermost kernels are what the library must have.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from iapb.advice.certificate import certify, certify_impacts
+from iapb.compiled import Kernel, block, kinds_of
+from iapb.contact.impact import resolve_impact
+from iapb.contact.kernels.impact import ImpactWork, factored_impacts
+from iapb.contact.laws import ImpulseAugmented, StepResult
+from iapb.haptics.coupling import UnilateralCoupler
+from iapb.haptics.device import SimulatedDevice
+from iapb.linalg import product
+from iapb.loop import make_record
+from iapb.mechanics.mechanism import Mechanism
+from iapb.recording import Recorder
+from iapb.scene import scene_from_text
+from iapb.schema import zeros_of
+from iapb.simulation import Simulation, simulate
+
+BALL_ON_FLOOR = """
+name: rehearsal
+rate: 1000
+duration: 0.001
+bodies:
+  - name: ball
+    joint: planar
+    mass: 1.0
+    inertia: 1.0
+    position: [0, 0.99, 0]
+    velocity: [0, -1, 0]
+    shapes: [{kind: circle, radius: 1.0}]
+walls: [{name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}]
+contact: {restitution: 0.5, friction: 0.1}
+hand: {body: ball, force: [0, -1, 0]}
+"""
+GAINS = UnilateralCoupler((1.0, 1.0, 1.0), (1.0, 1.0, 1.0))
+Call = tuple[Kernel, tuple[Any, ...]]
+
+
+def rehearsed() -> list[Call]:
+    """Return the kernels that Python calls, each with examples of its arguments."""
+    calls: dict[str, Call] = {}
+    running: list[Kernel] = []
+
+    def find(kernel: Kernel, kinds: str) -> Callable[..., Any]:
+        """Return the Python function; note its call if no other kernel is running."""
+
+        def run(*arguments: Any) -> Any:
+            if not running:
+                calls.setdefault(f"{kernel.name}({kinds_of(arguments)})", (kernel, arguments))
+            running.append(kernel)
+            try:
+                return kernel.function(*arguments)
+            finally:
+                running.pop()
+
+        return run
+
+    library_finds = Kernel.find
+    Kernel.find = find  # type: ignore[method-assign, assignment]
+    try:
+        _perform()
+    finally:
+        Kernel.find = library_finds  # type: ignore[method-assign]
+    return list(calls.values())
+
+
+def _perform() -> None:
+    """Ask everything of the engine that Python asks of it."""
+    scene = scene_from_text(BALL_ON_FLOOR)
+    run = simulate(scene)
+    certify(run)
+    _ = run.energy
+    simulate(scene, coupling=GAINS)
+    device = SimulatedDevice(np.eye(3), np.zeros(3), dt=0.001)
+    Simulation(scene, coupling=GAINS, device=device).step()
+    by_hand = Simulation(scene, OfPython(), GAINS)
+    by_hand.advance_chunk(make_record(1, *Recorder(by_hand).shape), 1)
+    by_hand.system.contacts_at(by_hand.state.q)
+    _impacts()
+    _mechanics(by_hand.system.mechanism)
+
+
+class OfPython(ImpulseAugmented):
+    """The engine's law, as a law in Python: the loop calls the parts of a step one by one."""
+
+    def advance(self, system: Any, state: Any, applied_force: Any, dt: float) -> StepResult:
+        """Advance one step."""
+        return super().advance(system, state, applied_force, dt)
+
+
+def _impacts() -> None:
+    v = np.array([-1.0, -1.0])
+    resolve_impact(np.eye(2), np.eye(2), v, 0.5)
+    certify_impacts(np.eye(2), v[None], -v[None])
+    work = block(zeros_of(ImpactWork, velocity=2, row=2))
+    many = np.eye(2)[None], np.eye(2)[None], v[None], np.ones(1)
+    factored_impacts(*many, 2, True, 1, work, np.empty((1, 2)), np.empty(1))
+
+
+def _mechanics(body: Mechanism) -> None:
+    """Ask for every quantity of a mechanism."""
+    q, v, g = body.neutral(), np.ones(body.nv), np.ones(3)
+    body.difference(q, body.integrate(q, v))
+    body.poses(q[None], planar=True)
+    body.mass_matrix(q)
+    body.bias(q, v)
+    body.gravity(q, g)
+    body.inverse_dynamics(q, v, v, g)
+    body.point_jacobian(q, 0, g)
+    body.frame_jacobian(q, 0)
+    body.rows_along(q[None], [0], g[None], g[None])
+    body.kinetic_energy(q, v)
+    body.displacements(np.stack([q, q]))
+    body.centroidal_momentum(q, v)
+    product(np.eye(2), np.eye(2))
