@@ -154,7 +154,6 @@ class System:
             contacts=not on.isdisjoint(
                 ("wall_contacts", "body_contacts", "self_collisions", "joint_limits")
             ),
-            supports=contact.forces == "implicit" and self.capacity > 1,
         )
         ranges = np.array(mechanism.tree_dofs, np.int64).reshape(-1, 2)
         world: Any = block(
@@ -173,7 +172,6 @@ class System:
                 clamped=contact.penalty == "clamped",
                 friction_class=self.frictions.class_of_shape,
                 friction=self.frictions.table,
-                implicit=contact.forces == "implicit",
                 tangents=self.tangents,
                 restitution=float(
                     self.restitutions[0] if len(self.restitutions) == 1 else contact.restitution

@@ -17,11 +17,18 @@ import numpy as np
 
 from iapb.advice.checks import chosen_scene
 from iapb.contact import laws
-from iapb.contact.geometry import Shapes
+from iapb.contact.geometry import Shapes, contact_capacity
 from iapb.haptics.coupling import Coupling
 from iapb.mechanics.mechanism import Mechanism
 from iapb.scene import Scene
-from iapb.scene.mechanism import frictions_of, mechanism_of, pairs_of, restitutions_of, shapes_of
+from iapb.scene.mechanism import (
+    frictions_of,
+    mechanism_of,
+    pairs_of,
+    restitutions_of,
+    shapes_of,
+    stops_of,
+)
 from iapb.scene.model import Device
 from iapb.schema import Indices
 
@@ -56,6 +63,7 @@ class Question:
     wall_pairs: int  # candidate pairs of a moving shape and a static one
     body_pairs: int  # candidate pairs of shapes of two trees
     tree_pairs: int  # candidate pairs of shapes of one tree
+    most_contacts: int  # for which there is room
     restitutions: list[float]  # different values of e among the pairs, ascending
     frictions: list[float]  # different values of mu among the pairs, ascending
     law: str | None
@@ -395,6 +403,17 @@ EFFECTS: dict[str, Rule] = {
         (laws.FRICTION,),
         ignores="friction",
     ),
+    "implicit_contact": Rule(
+        lambda q: "contact.forces = implicit: springs and friction act at the end of each step",
+        "stiff springs would need shorter steps",
+        lambda q: "" if q.scene.contact.forces == "implicit" else "contact.forces = paper",
+    ),
+    "supports": Rule(
+        lambda q: f"up to {q.most_contacts} contacts: those that carry a load take part in impacts",
+        "a body that is struck from above would sink into what carries it",
+        lambda q: "" if q.scene.contact.forces == "implicit" else "contact.forces = paper",
+        absent=lambda q: "" if q.most_contacts > 1 else "there is at most one contact",
+    ),
     # section III: contacts close together count as one; a contact near one of the step before is
     # not new
     "clustering": _contact(
@@ -521,6 +540,7 @@ def decide_for(
         to_walls,
         between,
         within,
+        contact_capacity(shapes, pairs) + len(stops_of(scene, mechanism).bound),
         restitutions.tolist(),
         frictions.tolist(),
         next(names),

@@ -74,9 +74,11 @@ LEFT_OUT: dict[str, dict[str, Any]] = {  # effect -> the variant of the scene wi
     },
 }
 # Effects that a switch of the step can turn on in a scene that does not need them; they then change
-# nothing. Friction in impacts is not among them, because its law needs arrays of its own.
+# nothing. Friction in impacts and implicit contact are not among them, because they need arrays of
+# their own.
+_OWN_ARRAYS = ("impact_friction", "implicit_contact", "supports")
 SWITCHED = tuple(
-    name for name in engine.Switches._fields if name in EFFECT_NAMES and name != "impact_friction"
+    name for name in engine.Switches._fields if name in EFFECT_NAMES and name not in _OWN_ARRAYS
 )
 _WHOLE, _ALL_ON = "with its effects", "all switched on"
 SCENES = ("peg_corner", "arm_pushing", "arm_obstacles")  # scenes whose effects are shown one by one

@@ -247,15 +247,28 @@ def resolve_rows(world, state, size, count):
         1.0,
     )
     tolerance = rank_tolerance(work.lower[:size, :size])
-    if world.switches.unequal_restitution or world.switches.pushing or world.implicit:
-        e, largest, unequal = 1.0, 0.0, world.switches.pushing or world.implicit and count > 1
+    if (
+        world.switches.unequal_restitution
+        or world.switches.pushing
+        or world.switches.implicit_contact
+    ):
+        e, largest, unequal = (
+            1.0,
+            0.0,
+            world.switches.pushing or world.switches.implicit_contact and count > 1,
+        )
         for r in range(count):
             i = state.rows[r]
             own = pair_restitution(world, contacts, i)
             state.row_restitution[r], e, largest = own, min(e, own), max(largest, own)
         unequal = unequal or e < largest
     whiten_impact(size, count, work)
-    if unequal and world.implicit and world.switches.impact_friction and not world.per_body_rows:
+    if (
+        unequal
+        and world.switches.implicit_contact
+        and world.switches.impact_friction
+        and not world.per_body_rows
+    ):
         return push_with_friction(world, state, size, count, e, tolerance)
     if unequal:
         rank, clamp, solved = resolve_unequal(world, state, size, count, e, tolerance)
@@ -348,7 +361,7 @@ def strike_again(world, state):
         state.contact_count[0],
         False,
     )
-    if not world.implicit or world.switches.impulse_limit:
+    if not world.switches.implicit_contact or world.switches.impulse_limit:
         return False
     for i in range(count):
         copy_contact(now, i, contacts, i)

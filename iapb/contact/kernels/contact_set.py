@@ -235,7 +235,9 @@ def find_islands(world, state):
     for t in range(islands.shape[0]):
         islands[t] = islands[islands[t]]  # smaller trees are settled already
     for i in range(state.contact_count[0]):
-        if contacts.collides[i] and (not world.implicit or contacts.mark[i] == STRIKES):
+        if contacts.collides[i] and (
+            not world.switches.implicit_contact or contacts.mark[i] == STRIKES
+        ):
             state.collides_of_tree[group_of_contact(world, contacts, i, islands)] = True
     return True
 
@@ -257,7 +259,7 @@ def add_supports(world, state):
     contact stops all, with friction.
     """
     contacts, begin, bounces = state.contacts, 0, False
-    for i in range(state.contact_count[0] if world.implicit else 0):
+    for i in range(state.contact_count[0] if world.switches.implicit_contact else 0):
         contacts.mark[i] = STRIKES if contacts.collides[i] else 0
         bounces = bounces or contacts.collides[i] and pair_restitution(world, contacts, i) > 0.0
     for i in range(state.contact_count[0] if bounces else 0):

@@ -145,7 +145,7 @@ def present_contacts(world, state, contacts):
     too many."""
     R, p, pairs = state.body.rotation, state.body.position, world.pairs
     margin = (
-        TOUCHING if world.implicit else 0.0
+        TOUCHING if world.switches.implicit_contact else 0.0
     )  # all corners of a face that touches, whatever its rounding
     if world.broad_phase.used:
         near = near_pairs(world.broad_phase, R, p, margin)
@@ -168,7 +168,7 @@ def move(world, state, applied):
     copy_into(state.start_v, state.v)
     accelerate(world, state, applied)
     add_multiple(state.v, world.dt, state.acceleration)
-    touches = world.switches.contacts and world.implicit
+    touches = world.switches.contacts and world.switches.implicit_contact
     if (touches or world.switches.joint_damping) and not implicit_forces(world, state, touches):
         return NOT_POSITIVE_DEFINITE
     finite = True
@@ -302,7 +302,9 @@ def falls(world, state, applied, t):
     by half a step.
     """
     alone = state.state_of_tree[t] == FREE
-    for k in range(world.tree_start[t], world.tree_stop[t] if world.implicit else 0):
+    for k in range(
+        world.tree_start[t], world.tree_stop[t] if world.switches.implicit_contact else 0
+    ):
         alone = alone and applied[k] == 0.0
     return alone
 
@@ -369,7 +371,7 @@ def accelerate(world, state, applied):
     acts.
     """
     a, contacts = state.acceleration, state.contacts
-    if not world.implicit:
+    if not world.switches.implicit_contact:
         for i in range(state.contact_count[0]):
             contacts.normal_force[i] = 0.0
             store(contacts.friction_force, i, (0.0, 0.0, 0.0))

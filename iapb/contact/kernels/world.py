@@ -29,6 +29,7 @@ class Switches(NamedTuple):
     pushing: bool
     impact_friction: bool
     friction: bool  # of resting contacts
+    implicit_contact: bool  # resting forces are implicit in the velocity; else explicit (5)
     clustering: bool
     # a contact that strikes may have others beside it, which carry a load or have another e
     supports: bool
@@ -68,7 +69,6 @@ class World(NamedTuple):
     gravity: np.ndarray  # (3,) [m/s²]
     stiffness: float  # K [N/m] (5)
     damping: float  # B [N s/m] (5)
-    implicit: bool  # resting forces implicit in the velocity; else the paper's explicit (5)
     tangents: int  # of a contact: 1 in the plane, 2 in space
     clamped: bool  # F_n >= 0; False: (5) as printed, may pull
     friction_class: np.ndarray  # (shapes + stops,) int64

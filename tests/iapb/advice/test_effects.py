@@ -70,6 +70,18 @@ SWITCHES: dict[str, tuple[Scene, dict[str, Any], dict[str, Any], str]] = {
     "penalty_stiffness": (PEG, {"contact.stiffness": 1234}, {"contact.stiffness": 0}, "1234 N/m"),
     "contact_damping": (PEG, {"contact.damping": 56}, {"contact.damping": 0}, "56 N s/m"),
     "friction": (PEG, {"contact.friction": 0.3}, {"contact.friction": 0}, "contact.friction = 0.3"),
+    "implicit_contact": (
+        PEG,
+        {"contact.forces": "implicit"},
+        {"contact.forces": "paper"},
+        "= implicit",
+    ),
+    "supports": (
+        PEG,
+        {"contact.forces": "implicit"},
+        {"contact.forces": "implicit", **NO_SHAPES},
+        "contacts",
+    ),
     "clustering": (
         PEG,
         {"contact.cluster_distance": 0.002},

@@ -105,6 +105,7 @@ CASES = {
     "one link": ("double_pendulum", ONE_LINK, IAPB, "none"),
     "damped": ("double_pendulum", {"bodies.upper.joint_damping": 0.1}, IAPB, "none"),
     "limited": ("double_pendulum", {"bodies.upper.joint_limits": [-0.01, 4.0]}, IAPB, "none"),
+    "implicit": peg(law=IAPB, contact__forces="implicit"),
     "arm with device": ("arm_pushing", {}, IAPB, "four-channel"),
 }
 
@@ -112,6 +113,8 @@ CASES = {
 ONLY = {
     "gravity": "gravity",
     "friction": "friction_share",
+    "implicit_contact": "rest_implicitly",
+    "supports": "leave_out_seams",
     "clustering": "cluster",
     "coherence": "same_surface squared_distance",
     "wall_contacts": "find_contacts detect contact_velocities resting_force",
