@@ -244,9 +244,10 @@ def swing(world, state, h):
             state.tree_energy[t] = base_momentum(
                 m, free, state.body, state.q, state.mass_matrix, start, stop, t, state.v, p
             )
-            center, mass = center_of(m, state.body, world.tree_of_body, t)
-            path = scale(h / mass if mass > 0.0 else 0.0, linear_momentum(m, free, t, p))
-            p[6], p[7], p[8] = add(center, path)
+            if free.base[t] > 0 and m.kind[free.root[t]] != SPHERICAL:
+                center, mass = center_of(m, state.body, world.tree_of_body, t)
+                path = scale(h / mass if mass > 0.0 else 0.0, linear_momentum(m, free, t, p))
+                p[6], p[7], p[8] = add(center, path)
     for b in range(m.kind.shape[0]):
         if free.kind[world.tree_of_body[b]] == LINKAGE:
             start, stop = m.v_start[b], m.v_start[b] + m.v_count[b]
