@@ -84,11 +84,11 @@ def extension(group: str, name: str) -> Any:
     raise MissingDependencyError("the extra report", f"{group}: {name}", installing("report"))
 
 
-def load_extensions(group: str, name: str = "") -> list[Any]:
-    """Import everything that installed packages offer in a group, or what they offer under a
-    name."""
+def load_extensions(group: str, name: str = "", purpose: str = "") -> list[Any]:
+    """Import everything that installed packages offer in a group, or what they offer under a name;
+    an error says that the purpose needs a package."""
     try:
         offered = entry_points(group=group, name=name) if name else entry_points(group=group)
         return [each.load() for each in offered]
     except ModuleNotFoundError as error:
-        raise name_the_extra(error, f"{group}: {name}" if name else group) from error
+        raise name_the_extra(error, purpose or f"{group}: {name}") from error

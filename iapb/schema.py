@@ -59,11 +59,15 @@ def _declared(record: Any) -> tuple[Quantity, ...]:
         (name, *get_args(hint)) for name, hint in hints.items() if hasattr(hint, "__metadata__")
     )
     return tuple(
-        (quantity(said) if isinstance(said, str) else said)._replace(
-            name=name, dtype=get_args(get_args(kind)[1])[0]
-        )
+        (quantity(said) if isinstance(said, str) else said)._replace(name=name, dtype=_dtype(kind))
         for name, kind, said in found
     )
+
+
+def _dtype(kind: Any) -> type:
+    """Return the type of the entries of NDArray[…]; some releases of numpy nest it in a dtype."""
+    last = get_args(kind)[-1]
+    return next(iter(get_args(last)), last)
 
 
 def blank(

@@ -65,7 +65,7 @@ def find_world(name: str, rendering: str = "full") -> World:
         There is no such world, or its law has no impulses to which a rendering applies.
     """
     if name not in WORLDS and ":" not in name:
-        load_extensions("iapb.worlds")
+        load_extensions("iapb.worlds", purpose=f"The world {name}")
         if name not in WORLDS:
             raise ArgumentError(
                 "world", name, f"{one_of(name, WORLDS)}, or your engine as module:engine"

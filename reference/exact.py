@@ -195,8 +195,10 @@ def bulk_energy_gain(
     masses = np.broadcast_to(masses, (n, d, d))
     difference, total = _two_sum(after, -before), _two_sum(after, before)
     change, change_low, size = _bilinear(masses, difference, total)
-    turned, turned_low, turned_size = _bilinear(masses, total, difference)
-    change, size = 0.5 * _add(change, change_low, turned, turned_low)[0], 0.5 * (size + turned_size)
+    if (masses != np.swapaxes(masses, 1, 2)).any():
+        turned, turned_low, turned_size = _bilinear(masses, total, difference)
+        change = 0.5 * _add(change, change_low, turned, turned_low)[0]
+        size = 0.5 * (size + turned_size)
     at_rest = np.zeros_like(before)
     energy, _, energy_size = _bilinear(masses, (before, at_rest), (before, at_rest))
     known = energy > d * d * _ROUNDING * energy_size
@@ -249,11 +251,11 @@ def _bilinear(
     (a_high, a_low), (b_high, b_low) = a, b
     felt = _multiply(b_high[:, None, :], b_low[:, None, :], masses, 0.0)
     terms = _multiply(a_high[:, :, None], a_low[:, :, None], *felt)
-    high, low = (part.reshape(n, d * d) for part in terms)
-    size = np.abs(high).sum(axis=1)
-    while high.shape[1] > 1:  # add halves: fewer roundings than one after another
-        if high.shape[1] % 2:
-            high, low = (np.pad(part, ((0, 0), (0, 1))) for part in (high, low))
-        half = high.shape[1] // 2
-        high, low = _add(high[:, :half], low[:, :half], high[:, half:], low[:, half:])
+    size = np.abs(terms[0]).sum(axis=(1, 2))
+    left = 1 << (d * d - 1).bit_length()
+    high, low = np.zeros((2, n, left))
+    high[:, : d * d], low[:, : d * d] = (part.reshape(n, d * d) for part in terms)
+    while left > 1:  # add halves: fewer roundings than one after another
+        left //= 2
+        high, low = _add(high[:, :left], low[:, :left], high[:, left:], low[:, left:])
     return high[:, 0], low[:, 0], size

@@ -37,11 +37,12 @@ bits = hashlib.sha256(run.q.tobytes() + run.v.tobytes() + after.velocity.tobytes
 print(json.dumps({"numpy": numpy.__version__, "first run": simulated, "bits": bits}))
 """
 VERDICT = """
-import json, time
+import json, sys, time
 start = time.perf_counter()
 from verification import check_passivity
 from iapb import resolve_impact
 passed = check_passivity(resolve_impact, impacts=50).passed
+assert "numba" not in sys.modules
 print(json.dumps({"passed": bool(passed), "verdict": time.perf_counter() - start}))
 """
 

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.complementarity import ImpactProblem
-from reference.complementarity.solvers.sweeps import settles
 from reference.exact import exact_impact
 
 Floats = NDArray[np.floating[Any]]
@@ -452,6 +451,8 @@ def draw_frictional_case(
     Sweeps over the contacts converge slowly if a normal is nearly parallel to its tangents, or to
     another normal. About one draw in 60 needs more than SWEEPS; it is drawn again.
     """
+    from reference.complementarity.solvers.sweeps import settles  # brings numba
+
     while True:
         case = _frictional_case(rng, number, largest_condition)
         blocks = np.concatenate([case.contact_jacobian[:, None], np.asarray(case.tangents)], axis=1)

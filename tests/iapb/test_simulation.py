@@ -17,7 +17,7 @@ from iapb.advice.distrust import distrust_of
 from iapb.contact.laws import RENDERINGS, ImpulseAugmented, Penalty, StepResult
 from iapb.errors import ArgumentError
 from iapb.haptics.coupling import FourChannel, NoCoupling
-from iapb.recording import CONTACTS, IMPACTS
+from iapb.loop import CONTACTS, IMPACTS
 from iapb.run import FREE, Run
 from iapb.scene import find_scene, load_scene, scene_from_text
 from iapb.schema import quantities

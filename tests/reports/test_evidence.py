@@ -249,7 +249,7 @@ def test_a_stage_computed_in_a_process_is_that_of_this_process(tmp_path, monkeyp
     assert made[name].records == read.records and {record.name for record in read.records} == set(
         all_proofs()
     )
-    assert said[0] == (gather.BESIDE, 0, 3) and said[-1] == (gather.BESIDE, 3, 3)
+    assert said[0] == (gather.BESIDE, 0, 2) and said[-1] == (gather.BESIDE, 2, 2)
 
 
 def test_a_topic_that_fails_is_named_and_ctrl_c_is_no_failure(tmp_path, monkeypatch):

@@ -169,7 +169,7 @@ def test_a_scheduler_that_dies_or_is_not_there_is_told_in_one_sentence(tmp_path)
         for role, more in roles.items()
     )
     try:
-        while not place.is_file():
+        while not (place.is_file() and place.read_text()):
             time.sleep(0.05)
         address = json.loads(place.read_text())["address"]
         said = "the scheduler at tcp://127.0.0.1:.* no longer answers; finished"

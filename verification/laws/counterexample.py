@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from reference.exact import independent_rows
 from verification.impacts import ImpactCase
 from verification.laws.bounds import FACTORED, KIT, ONE_SIDED, Bounds
 from verification.laws.contracts import CONTRACTS, EXACT_LAWS
-from verification.laws.strategies import tangents_are_independent
 
 _DIGITS = (0, 1, 2, 4, 8)
 
@@ -176,3 +176,12 @@ def _written(array: np.ndarray) -> str:
     """The array as source code; an empty array also needs its shape."""
     text = f"np.array({array.tolist()!r}, dtype=float)"
     return text if array.size else f"{text}.reshape({array.shape})"
+
+
+def tangents_are_independent(case: ImpactCase) -> bool:
+    """Whether the normal and the tangents of each contact are linearly independent; True without
+    friction."""
+    if case.tangents is None:
+        return True
+    blocks = np.concatenate([case.contact_jacobian[:, None], case.tangents], axis=1)
+    return all(len(independent_rows(block)) == len(block) for block in blocks)

@@ -7,12 +7,13 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
+from importlib.util import find_spec
 from inspect import signature
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from iapb.errors import ArgumentError
+from iapb.errors import ArgumentError, MissingDependencyError, installing
 from iapb.names import one_of
 from reference.one_thread import one_thread
 from verification.impacts import (
@@ -28,7 +29,6 @@ from verification.laws.contracts import CONTRACTS, EXACT_LAWS, OF_VARIANTS, Cont
 from verification.laws.counterexample import as_test, name_of, shrink
 from verification.laws.equality import OF_ONE_CALL, UNEQUAL_LAWS
 from verification.laws.resolver import Resolver, ResolverFault, Watched, own_answer
-from verification.laws.strategies import search_counterexample
 
 # the search prefers counterexamples with a residual above this, which rounding cannot explain
 NOTABLE = 1e-6
@@ -339,6 +339,7 @@ def check_passivity(
         if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < least:
             raise ArgumentError(name, count, f"a whole number, {least} or more")
     _refuse_signature(resolver, contract)
+    _find_hypothesis()
     terms = CONTRACTS[contract]
     bounds = terms.bounds if bounds is None else bounds
     condition = terms.largest_condition if largest_condition is None else largest_condition
@@ -379,6 +380,17 @@ def check_passivity(
         contract,
         str(returned) if isinstance(returned, ResolverFault) else returned,
     )
+
+
+def _find_hypothesis() -> None:
+    """Refuse at once if hypothesis is missing; only the search for a small counterexample loads
+    it."""
+    try:
+        if find_spec("hypothesis") is not None:
+            return
+    except ModuleNotFoundError:
+        pass
+    raise MissingDependencyError("hypothesis", "verification.check_passivity", installing("verify"))
 
 
 def _refuse_signature(resolver: Resolver, contract: str) -> None:
@@ -529,6 +541,8 @@ def _counterexample(
         return residual is not None and not residual.passed and not residual.value < least
 
     kind = "unequal" if broken.law in UNEQUAL_LAWS else contract
+    from verification.laws.strategies import search_counterexample  # brings hypothesis
+
     for least in (NOTABLE, 0.0):
         fails = partial(breaks, least=least)
         found = (

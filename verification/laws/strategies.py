@@ -12,8 +12,8 @@ from hypothesis import HealthCheck, Phase, assume, find, settings
 from hypothesis import strategies as st
 from hypothesis.errors import NoSuchExample
 
-from reference.exact import independent_rows
 from verification.impacts import Floats, ImpactCase, cradle_rows
+from verification.laws.counterexample import tangents_are_independent
 
 
 @st.composite
@@ -108,15 +108,6 @@ def frictional_cases(draw: st.DrawFn) -> ImpactCase:
     )
     assume(tangents_are_independent(case))
     return case
-
-
-def tangents_are_independent(case: ImpactCase) -> bool:
-    """Whether the normal and the tangents of each contact are linearly independent; True without
-    friction."""
-    if case.tangents is None:
-        return True
-    blocks = np.concatenate([case.contact_jacobian[:, None], case.tangents], axis=1)
-    return all(len(independent_rows(block)) == len(block) for block in blocks)
 
 
 # Strategies for the search of counterexamples: one per contract, and one with a restitution per

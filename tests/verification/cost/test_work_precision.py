@@ -186,10 +186,10 @@ def test_a_rival_wins_an_impact_only_where_it_is_faster_and_as_exact() -> None:
 
 
 def test_a_solver_that_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    def missing() -> None:
+    def missing(name: str) -> None:
         raise ImportError("no quantecon")
 
-    monkeypatch.setattr(calls, "import_lcp_lemke", missing)
+    monkeypatch.setattr(calls, "import_module", missing)
     found = study.work_precision(
         [(1, 3)], 3, [way for way in study.WAYS if way.method == study.LEMKE]
     )
