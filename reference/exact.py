@@ -112,15 +112,26 @@ def relative_energy_gain(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: Arr
     If KE⁻ = 0, the result is 0 for KE⁺ = 0 and infinity otherwise. For many impacts see
     `bulk_energy_gain`.
     """
-    mass = rational_matrix("mass_matrix", mass_matrix)
-    given = rational_matrix("v_minus", v_minus), rational_matrix("v_plus", v_plus)
-    before, after = (fractions_of(x.transpose() * mass * x)[0] for x in given)
+    mass = _whole_numbers("mass_matrix", mass_matrix)
+    v, v_after = _whole_numbers("velocities", [v_minus, v_plus])
+    before, after = v @ mass @ v, v_after @ mass @ v_after  # ½ and both units cancel
     if before == 0:
         return 0.0 if after == 0 else np.inf
     try:
         return float((after - before) / before) or 5e-324 * (after > before)
     except OverflowError:  # the gain is above 1.8e308; a loss is never below -1
         return np.inf
+
+
+def _whole_numbers(name: str, values: ArrayLike) -> Any:
+    """Return Python integers of any length whose ratios are those of the values."""
+    given = np.asarray(values, np.float64)
+    if not np.isfinite(given).all():
+        raise ArgumentError(name, given, "finite numbers")
+    mantissas, exponents = np.frexp(given)
+    whole = (mantissas * 2.0**53).astype(np.int64)
+    shifts = np.where(whole != 0, exponents - exponents[whole != 0].min(initial=2000), 0)
+    return whole.astype(object) << shifts.astype(object)
 
 
 def condition_number(mass_matrix: ArrayLike) -> float:

@@ -522,7 +522,7 @@ def decide_for(
     to_walls, between, within = (int(each.sum()) for each in (wall, ~wall & ~same, ~wall & same))
     restitutions, frictions = (
         restitutions_of(scene, pairs),
-        np.unique(frictions_of(scene).by_pair(pairs)),
+        sorted(set(frictions_of(scene).by_pair(pairs).tolist())),
     )
     if law is not None and not isinstance(law, str):
         law = law.within(scene) if hasattr(law, "within") else law
@@ -542,7 +542,7 @@ def decide_for(
         within,
         contact_capacity(shapes, pairs) + len(stops_of(scene, mechanism).bound),
         restitutions.tolist(),
-        frictions.tolist(),
+        frictions,
         next(names),
         uses,
         next(names),

@@ -251,7 +251,8 @@ def restitutions_of(scene: Scene, pairs: Pairs) -> Floats:
     """Return the distinct values of e among the candidate pairs (k, 2) of shapes and the joints'
     stops, ascending."""
     stops = [scene.contact.restitution] if _stop_count(scene) else []
-    return np.unique(np.concatenate([restitution_by_pair(scene, pairs), stops]))
+    found = np.concatenate([restitution_by_pair(scene, pairs), stops])
+    return np.array(sorted(set(found.tolist())))
 
 
 class Frictions(NamedTuple):
