@@ -447,7 +447,7 @@ def diagnose(M: Floats, J: Floats, v: Floats, out: Any, refused: int, many: bool
 
 
 def _checked(names: tuple[str, str, str], mass_matrix: Any, jacobian: Any, velocity: Any) -> Arrays:
-    """Return contiguous doubles; n = 1 unless the names are those of many impacts."""
+    """Return the arrays of one impact as doubles, or of many if the names are those of many."""
     many = names is _MANY
     M, v = _array(names[0], mass_matrix, 2 + many), _array(names[2], velocity, 1 + many)
     lead, d = v.shape[:many], M.shape[-1]
@@ -486,13 +486,8 @@ def real_numbers(value: Any) -> NDArray[Any] | None:
 
 
 def _array(name: str, value: Any, dimensions: int) -> Floats:
-    """Return a contiguous array of doubles, without a check that they are finite."""
-    if (
-        type(value) is np.ndarray
-        and value.dtype is _DOUBLE
-        and value.ndim == dimensions
-        and value.flags.carray
-    ):
+    """Return an array of doubles, without a check that they are finite."""
+    if type(value) is np.ndarray and value.dtype is _DOUBLE and value.ndim == dimensions:
         return value
     given = real_numbers(value)
     if given is None:
@@ -502,7 +497,7 @@ def _array(name: str, value: Any, dimensions: int) -> Floats:
         raise ArgumentError(
             name, array.shape, f"an array of {dimensions} dimension{'s' * (dimensions > 1)}"
         )
-    return np.require(array, requirements=["C", "A", "W"])
+    return array
 
 
 def _coefficients(
