@@ -22,6 +22,7 @@ import numpy as np
 from pydantic import Field, ValidationError
 
 from iapb.errors import ArgumentError, Mistake, shown
+from iapb.linalg import product
 from iapb.mechanics.joints import KINDS
 from iapb.names import one_of
 from iapb.scene.bodies import ORIGIN, WORLD, SpatialBody, SpatialShape
@@ -95,7 +96,6 @@ def bodies_of(robot: Robot, folder: Path) -> list[dict[str, Any]]:
         The path leads out of the folder, the file is not a URDF robot, or a named link does not
         exist.
     """
-    from iapb.linalg import product  # brings numba along
     from iapb.mechanics.rotations import angles_of, rotation_of
     from iapb.mechanics.urdf import read_urdf
 
