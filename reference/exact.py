@@ -123,7 +123,7 @@ def relative_energy_gain(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: Arr
         return np.inf
 
 
-def _whole_numbers(name: str, values: ArrayLike) -> Any:
+def _whole_numbers(name: str, values: Any) -> Any:
     """Return Python integers of any length whose ratios are those of the values."""
     given = np.asarray(values, np.float64)
     if not np.isfinite(given).all():
