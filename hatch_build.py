@@ -13,7 +13,7 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 LIBRARY = "iapb/engine.so"
-OLDEST_GLIBC = (2, 17)  # of manylinux_2_17: nine years older than this line
+OLDEST_GLIBC = (2, 17)  # what manylinux_2_17 promises
 
 
 class EngineLibrary(BuildHookInterface):  # type: ignore[type-arg]

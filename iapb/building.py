@@ -29,7 +29,7 @@ from numba import typeof, types
 
 from iapb.bitcode import dispatcher_of
 from iapb.compiled import Block, kinds_of
-from iapb.library import MARK, PATH, manifest_of, stamp
+from iapb.library import MARK, PATH, Library, manifest_of, stamp
 from iapb.rehearsal import Call, rehearsed
 
 # Cost up to which LLVM inlines a call; with its default of 225 the effects of a step are not
@@ -140,6 +140,7 @@ def build(path: Path) -> None:
         made = path.with_suffix(f".{os.getpid()}")
         options = ["-O2", "-shared", "-fPIC", "-s", "-o", made, stubs, *parts, "-lm"]
         subprocess.run([*c_compiler(), *map(str, options)], check=True)
+        Library(made, kernels)  # it can be loaded: no symbol is missing
         made.replace(path)
 
 

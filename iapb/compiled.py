@@ -73,13 +73,9 @@ class Entry:
     def __call__(self, *arguments: Any) -> Any:
         """Call the kernel."""
         if self._function is None:
-            self._function = self.taking(*arguments)
+            kernel = self._kernel
+            self._function = kernel if AS_PYTHON else kernel.taking(*arguments)
         return self._function(*arguments)
-
-    def taking(self, *examples: Any) -> Callable[..., Any]:
-        """Return the function for arguments of the examples' kinds."""
-        found = self._kernel
-        return found.taking(*examples) if isinstance(found, Kernel) else found
 
 
 @kernel
@@ -175,4 +171,4 @@ def words_of(value: Any) -> tuple[int, ...]:
         return (value.address,)
     if isinstance(value, float):
         return struct.unpack("q", struct.pack("d", value))
-    return (int(value or 0),)
+    return (int(value),)

@@ -28,12 +28,15 @@ from iapb.errors import IapbError
 PACKAGE = Path(__file__).parent
 PATH = PACKAGE / "engine.so"
 MARK = b"iapb engine library: "  # before the manifest
-RESULTS = {"int": ctypes.c_int64, "float": ctypes.c_double, "bool": ctypes.c_bool}
-# Files without kernels that decide what is compiled: how, and constants that kernels read.
-_READ_BY_KERNELS = (
+NUMBERS = {"int": ctypes.c_int64, "float": ctypes.c_double, "bool": ctypes.c_bool}
+# Files without kernels that decide what is compiled, and how: the compiler, the layout of blocks and
+# arguments, and constants that kernels read.
+_DECIDE = (
+    "bitcode.py",
     "building.py",
     "rehearsal.py",
     "compiled.py",
+    "library.py",
     "run.py",
     "joints.py",
     "arrays.py",
@@ -44,7 +47,7 @@ _READ_BY_KERNELS = (
 def sources() -> Iterator[Path]:
     """Yield the files that decide what the library does."""
     for path in sorted(PACKAGE.rglob("*.py")):
-        if path.name in _READ_BY_KERNELS or b"\n@kernel" in path.read_bytes():
+        if path.name in _DECIDE or b"\n@kernel" in path.read_bytes():
             yield path
 
 
@@ -52,7 +55,7 @@ def stamp() -> str:
     """Return a hash of the files that decide what the library does, and the platform."""
     digest = hashlib.sha256()
     for path in sources():
-        digest.update(path.name.encode() + b"\0" + path.read_bytes())
+        digest.update(f"{path.relative_to(PACKAGE)}\0".encode() + path.read_bytes())
     processor = os.environ.get("IAPB_BUILD_FOR", platform.machine())
     return f"{sys.platform} {processor} {digest.hexdigest()}"
 
@@ -73,9 +76,8 @@ class Library:
 
     def __init__(self, path: Path, kernels: dict[str, tuple[str, list[str]]]) -> None:
         try:
-            self._loaded = ctypes.PyDLL(
-                str(path)
-            )  # keeps the interpreter's lock: scratch is shared
+            # PyDLL keeps the interpreter's lock during a call, for all calls share scratch.
+            self._loaded = ctypes.PyDLL(str(path))
         except OSError as error:
             raise IapbError(f"the engine's library cannot be loaded: {error}") from error
         self.kernels = kernels
@@ -112,9 +114,8 @@ def _python_function(code: Any, kinds: list[str], results: list[str]) -> Callabl
             words.append(f"*words_of_array({name})")
         else:
             form += "d" if kind == "float" else "q"
-            numbers = {"int": name, "float": name, "bool": name, "NoneType": "0"}
-            words.append(numbers.get(kind, f"{name}.address"))
-    fields = [(f"r{k}", RESULTS[kind]) for k, kind in enumerate(results)]
+            words.append(name if kind in NUMBERS else f"{name}.address")
+    fields = [(f"r{k}", NUMBERS[kind]) for k, kind in enumerate(results)]
     returned = ", ".join(f"result.{name}" for name, _ in fields)
     scope = {
         "code": code,
@@ -124,6 +125,7 @@ def _python_function(code: Any, kinds: list[str], results: list[str]) -> Callabl
         "byref": ctypes.byref,
         "error": ctypes.byref(ctypes.c_void_p()),
     }
+    # Made from text: a loop over the arguments would take as long as a small kernel.
     text = f"""
 def call({", ".join(names)}):
     result = Result()

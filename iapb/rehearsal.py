@@ -15,13 +15,11 @@ from iapb.advice.certificate import certify, certify_impacts
 from iapb.compiled import Kernel, block, kinds_of
 from iapb.contact.impact import resolve_impact
 from iapb.contact.kernels.impact import ImpactWork, factored_impacts
-from iapb.contact.laws import ImpulseAugmented, StepResult
 from iapb.haptics.coupling import UnilateralCoupler
 from iapb.haptics.device import SimulatedDevice
 from iapb.linalg import product
-from iapb.loop import make_record
 from iapb.mechanics.mechanism import Mechanism
-from iapb.recording import Recorder
+from iapb.mechanics.rotations import angles_of
 from iapb.scene import scene_from_text
 from iapb.schema import zeros_of
 from iapb.simulation import Simulation, simulate
@@ -80,22 +78,12 @@ def _perform() -> None:
     run = simulate(scene)
     certify(run)
     _ = run.energy
-    simulate(scene, coupling=GAINS)
     device = SimulatedDevice(np.eye(3), np.zeros(3), dt=0.001)
-    Simulation(scene, coupling=GAINS, device=device).step()
-    by_hand = Simulation(scene, OfPython(), GAINS)
-    by_hand.advance_chunk(make_record(1, *Recorder(by_hand).shape), 1)
-    by_hand.system.contacts_at(by_hand.state.q)
+    simulation = Simulation(scene, coupling=GAINS, device=device)
+    simulation.step()
+    simulation.system.contacts_at(simulation.state.q)
     _impacts()
-    _mechanics(by_hand.system.mechanism)
-
-
-class OfPython(ImpulseAugmented):
-    """The engine's law, as a law in Python: the loop calls the parts of a step one by one."""
-
-    def advance(self, system: Any, state: Any, applied_force: Any, dt: float) -> StepResult:
-        """Advance one step."""
-        return super().advance(system, state, applied_force, dt)
+    _mechanics(simulation.system.mechanism)
 
 
 def _impacts() -> None:
@@ -123,3 +111,4 @@ def _mechanics(body: Mechanism) -> None:
     body.displacements(np.stack([q, q]))
     body.centroidal_momentum(q, v)
     product(np.eye(2), np.eye(2))
+    angles_of(np.eye(3))

@@ -1,6 +1,6 @@
 """An effect that is off is not entered: calls are counted, with the kernels run as plain Python.
 
-A process of its own, because `NUMBA_DISABLE_JIT` is read once, when numba is imported.
+A process of its own, because `NUMBA_DISABLE_JIT` is read once, when iapb is imported.
 """
 
 from __future__ import annotations
