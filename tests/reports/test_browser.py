@@ -259,7 +259,7 @@ def test_each_page_is_whole_and_the_first_screens_of_the_report_that_is_here_ans
             figures += sight.ask("() => document.querySelectorAll('figure').length")
         sight.page.goto(given.as_uri())
         assert (
-            figures == 6
+            figures == len(FIGURES)
             or given == REAL
             and sight.ask(BELOW, [ANSWERED, (1 + (size == PHONE)) * size[1]]) == []
         )

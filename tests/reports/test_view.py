@@ -222,6 +222,23 @@ def dragged(phase, start, end):
     )
 
 
+# A browser counts from its first camera on.
+CAMERA = msgspec.msgpack.encode(
+    {
+        "type": "ViewerCameraMessage",
+        "wxyz": (1.0, 0.0, 0.0, 0.0),
+        "position": (0.0, 0.0, 1.0),
+        "fov": 1.0,
+        "near": 0.01,
+        "far": 10.0,
+        "image_height": 480,
+        "image_width": 640,
+        "look_at": (0.0, 0.0, 0.0),
+        "up_direction": (0.0, 1.0, 0.0),
+    }
+)
+
+
 def eventually(holds):
     """Wait until it holds."""
     end = time.monotonic() + 20.0
@@ -247,6 +264,8 @@ def test_a_drag_pulls_the_gripped_point_of_the_tool_and_a_browser_that_goes_clos
     half = np.sqrt(0.5)
     page.show(np.array([[0.02, -0.01, 0.0, 0.0, 0.0, half, half]]))  # turned by a right angle
     with connect(socket, origin=root, subprotocols=protocol) as client:
+        client.send(CAMERA)
+        eventually(page._server.get_clients)  # `wait` has no end without one
         page.wait()
         assert page.is_open() and page.pull is None
         client.send(dragged("start", (0.02, 0.0, 0.0), (0.02, 0.0, 0.0)))

@@ -424,16 +424,3 @@ def test_a_terminal_gets_colours_and_nothing_else_that_it_obeys():
     Harmless(stream, re.compile(r"(\x1b\[[0-9;]*m)")).write(f"\x1b[1;31mred\x1b[0m\n{ORDERS}")
     assert stream.getvalue() == f"\x1b[1;31mred\x1b[0m\n{harmless(ORDERS)}"
     assert harmless("tab\tand\nend") == "tab\tand\nend" and "\r" not in harmless(ORDERS)
-
-
-def test_without_a_folder_for_the_cache_kernels_are_compiled_in_memory_and_it_is_said():
-    program = (
-        "import numba.core.caching as c; c.CacheImpl._locator_classes = []\n"
-        "import numpy as np; from iapb.compiled import copy_into\n"
-        "a = np.zeros(3); copy_into(a, np.ones(3)); print(a.sum())"
-    )
-    done = process(sys.executable, "-c", program, folder=ROOT)
-    assert (
-        done.stdout.strip() == "3.0"
-        and done.stderr.count("UserWarning: kernels are compiled anew") == 1
-    )
