@@ -13,6 +13,9 @@ The first is exact to first order. P is compared, since single contacts need not
 their resultant if M is constant; otherwise the sum of generalized impulses, each with the Jacobian
 of its own pose.
 
+The reference world runs a second time at half its step; the difference is its own error. Worlds
+whose distances differ by less are not ordered.
+
 Every complementarity solver then solves the scene's impacts in IAPB; recomputed residuals judge the
 answers.
 """
@@ -39,12 +42,13 @@ from iapb.scene import Scene, find_scene, load_scene
 from iapb.scene.mechanism import mechanism_of
 from iapb.simulation import INTERRUPTED
 from reference import Floats
+from reference.complementarity.laws import newton_lcp
 from reference.complementarity.solvers import SOLVERS
 from reference.datasets import StoredProblem
 from reference.mujoco import MuJoCo
 from reference.worlds import WORLDS, run_world
-from verification.complementarity.agreement import compare_cases
-from verification.complementarity.of_runs import impacts_of_run, problems_of_run
+from verification.complementarity.agreement import PUSHED, SAME, distances
+from verification.complementarity.of_runs import StruckImpact, problems_of_run
 from verification.complementarity.solvers import VERDICTS, ProblemStudy, study_read
 from verification.finding import (
     MIXED,
@@ -121,8 +125,10 @@ def compare_worlds(
     -------
     Finding
         Its tables are "worlds" (one row per world), "over time", and, if there are impacts,
-        "solvers" and "problems". The answer ranks the worlds whose runs are complete and
-        trustworthy, and names the others with the reason.
+        "solvers" and "problems". The answer begins with IAPB's impacts beside the LCP's. Then it
+        names the closest of the worlds whose runs are complete and trustworthy, unless they differ
+        by less than the reference's own error (the difference from itself at half its step), and
+        the others with the reason.
 
     Raises
     ------
@@ -146,6 +152,10 @@ def compare_worlds(
             f"{scene.name} cannot be simulated in the reference world {against}: {reason}; "
             "choose another with `against`"
         )
+    finer = None
+    if not _unfit(scene, runs[against][0]):
+        twice = scene.with_values({"rate": 2.0 * scene.rate})
+        finer = attempt(f"{against} at half its step", partial(_run, twice, against, say), failures)
     mechanism = mechanism_of(scene)
     impulse = (
         "resultant of all contacts"
@@ -154,16 +164,17 @@ def compare_worlds(
     )
     unfit = {name: why for name, (run, _) in runs.items() if (why := _unfit(scene, run))}
     series = {name: _series(mechanism, run, runs[against][0]) for name, (run, _) in runs.items()}
+    own = _series(mechanism, finer[0], runs[against][0], 2) if finer else None
     fastest = min(seconds for _, seconds in runs.values())
     tables = {
         "worlds": table_from(
             [
-                _world(name, ran, None if name == against else series[name], fastest)
+                _world(name, ran, own if name == against else series[name], fastest)
                 for name, ran in runs.items()
             ],
             3,
             f"Distances from {against}, in the kinetic metric for the whole mass, at {INSTANTS} "
-            f"instants at most. "
+            f"instants at most. In its own row: from itself at half its step. "
             f"Impulse: {impulse}. Lost: start and work done, minus the end. The time is the "
             f"processor's, without "
             "set-up.",
@@ -181,17 +192,21 @@ def compare_worlds(
     )
     said += "".join(f"; {name} {why}" for name, why in unfit.items())
     parts = [Part(f"{said}.", MIXED if unfit else REPRODUCED, "runs", fit, len(runs))]
+    headline: list[str] = []
     if impacts:
         struck = runs["IAPB"][0] if "IAPB" in runs else run_world(scene, "IAPB", partial=True)
         judged = attempt(
             "impacts", partial(compare_impacts, struck, scene, impacts, say, failures), failures
         )
-        parts, tables = (parts + judged[0], tables | judged[1]) if judged else (parts, tables)
+        if judged:
+            parts += judged[0]
+            tables |= judged[1]
+            headline = [part.sentence for part in judged[0] if part.name == "motion"]
     finding = finding_of(
         f"worlds of {scene.name}",
         scene.title or scene.name,
         QUESTION,
-        _answer(runs, series, against, unfit),
+        " ".join([*headline, _answer(runs, series, own, against, unfit)]),
         parts,
         tables,
         failures,
@@ -248,39 +263,39 @@ def _run(scene: Scene, world: str, say: Progress) -> Ran:
     return run, float(run.chunk_seconds.sum()) / run.steps  # one chunk: wall-clock time
 
 
-def _series(mechanism: Mechanism, run: Run, reference: Run) -> Series:
-    """Return all compared quantities over time, at the instants that both runs have."""
+def _series(mechanism: Mechanism, run: Run, reference: Run, every: int = 1) -> Series:
+    """Return all compared quantities over time, at the instants that both runs have; `every` steps
+    of `run` are one of the reference."""
     at = np.unique(
         np.linspace(0, reference.steps, min(reference.steps, INSTANTS) + 1).round().astype(np.int64)
     )
-    at = at[at <= run.steps]
+    at = at[every * at <= run.steps]
+    mine = every * at
     q, v = reference.q[at], reference.v[at]
     mass, whole = mechanism.mass_matrices(q), float(mechanism.arrays.mass.sum())
-    moved = np.array([mechanism.difference(*pair) for pair in zip(q, run.q[at], strict=True)])
+    moved = np.array([mechanism.difference(*pair) for pair in zip(q, run.q[mine], strict=True)])
+    faster = run.v[mine] - v
     forms: dict[str, Floats | None] = {
         "configuration": np.einsum("ki,kij,kj->k", moved, mass, moved) / whole,
-        "velocity": np.einsum("ki,kij,kj->k", run.v[at] - v, mass, run.v[at] - v) / whole,
+        "velocity": np.einsum("ki,kij,kj->k", faster, mass, faster) / whole,
         "impulse": None,
     }
     if run.records_contacts and reference.records_contacts:
-        given = _given(run)[at] - _given(reference)[at]
+        given = _given(run)[mine] - _given(reference)[at]
         answer = np.linalg.solve(mass, given[:, :, None])[:, :, 0]
         forms["impulse"] = np.einsum("ki,ki->k", given, answer) * whole
-    depth, steps = (
-        np.zeros(run.steps + 1),
-        np.repeat(np.arange(run.steps), np.diff(run.contacts.offsets)),
-    )
+    depth = np.zeros(run.steps + 1)
+    steps = np.repeat(np.arange(run.steps), np.diff(run.contacts.offsets))
     np.maximum.at(depth, steps + 1, -run.contacts.gap)
-    since = np.minimum(
-        np.concatenate([[0], at[:-1] + 1]), run.steps
-    )  # the deepest since the previous instant
+    # the deepest since the previous instant
+    since = np.minimum(np.concatenate([[0], mine[:-1] + 1]), run.steps)
     return {
-        "time [s]": run.time[at],
+        "time [s]": run.time[mine],
         **{
             f"{name} [{_UNITS[name]}]": None if form is None else np.sqrt(np.maximum(form, 0.0))
             for name, form in forms.items()
         },
-        "energy [J]": run.energy["kinetic"][at] + run.energy["potential"][at],
+        "energy [J]": run.energy["kinetic"][mine] + run.energy["potential"][mine],
         "penetration [m]": np.maximum.reduceat(depth, since) if run.records_contacts else None,
     }
 
@@ -298,7 +313,8 @@ def _given(run: Run) -> Floats:
 
 
 def _world(name: str, ran: Ran, apart: Series | None, fastest: float) -> Row:
-    """Return the row of a world; `apart` has its distances, None for the reference world."""
+    """Return the row of a world; `apart` has its distances, those of the reference world from
+    itself at half its step."""
     run, seconds = ran
     far: dict[str, float | None] = {}
     for key, unit in _UNITS.items():
@@ -357,10 +373,17 @@ def _unfit(scene: Scene, run: Run) -> str:
 
 
 def _answer(
-    runs: dict[str, Ran], series: dict[str, Series], against: str, unfit: dict[str, str]
+    runs: dict[str, Ran],
+    series: dict[str, Series],
+    own: Series | None,
+    against: str,
+    unfit: dict[str, str],
 ) -> str:
     """Return which world is closest to the reference, and how close, among the worlds fit for the
-    comparison."""
+    comparison.
+
+    Worlds are equally close if their distances differ by less than the reference's own error.
+    """
     if len(series) == 1:
         return f"Only {against} was simulated."
     if against in unfit:
@@ -377,13 +400,25 @@ def _answer(
     )
     if not far:
         return f"No world can be compared with {against}.{left_out}"
+    if own is None:
+        return f"No order of the worlds: {against} fails at half its step.{left_out}"
+    error = _sizes(own["configuration [m]"])["rms"]
+    known = f"{against} itself moves by {1e3 * error:.3g} mm at half its step."
     closest = min(far, key=lambda name: far[name]["rms"])
+    nearest = far[closest]["rms"]
+    equal = [name for name in far if far[name]["rms"] - nearest <= error]
+    if len(equal) > 1:
+        each = ", ".join(f"{name} {1e3 * far[name]['rms']:.3g}" for name in equal)
+        return (
+            f"Equally close to {against}: {each} mm apart (rms over mass and time), as far "
+            f"as it can tell: {known}{left_out}"
+        )
     ratio = runs[against][1] / runs[closest][1]
     speed = f"{ratio:.3g} times as fast" if ratio >= 1.0 else f"{1.0 / ratio:.3g} times as slow"
     return (
-        f"Closest to {against} is {closest}: {1e3 * far[closest]['rms']:.3g} mm apart (rms over "
+        f"Closest to {against} is {closest}: {1e3 * nearest:.3g} mm apart (rms over "
         f"mass and time), "
-        f"{1e3 * far[closest]['most']:.3g} mm at most; its step is {speed}.{left_out}"
+        f"{1e3 * far[closest]['most']:.3g} mm at most; its step is {speed}. {known}{left_out}"
     )
 
 
@@ -398,25 +433,21 @@ def compare_impacts(
     run: Run, scene: Scene, most: int, progress: Progress, failures: list[Failure]
 ) -> tuple[list[Part], dict[str, Table]]:
     """Return the parts on the impacts of an IAPB run, and the tables "solvers" and "problems"."""
-    problems, left_out = problems_of_run(run, scene, most)
-    if not problems:
-        why = f"{left_out} impacts follow another law than (21)" if left_out else "nothing collides"
-        said = f"No impact of {scene.name} can be given to solvers: {why}."
+    struck = problems_of_run(run, scene)
+    if not struck:
+        said = f"No impact of {scene.name} can be given to solvers: nothing collides."
         return [Part(said, NOT_TESTABLE, "impacts", optional=True)], {}
+    problems = [
+        problem
+        for one in _spread(struck, most)
+        for problem in (one.smooth, one.rough)
+        if problem is not None
+    ]
     stored = [StoredProblem(problem) for problem in problems]
     study = study_read(
         f"impacts of {scene.name}", stored, longest=LONGEST, progress=progress, failures=failures
     )
-    # IAPB's impacts equal those of the Newton LCP if all contacts push
-    compared = compare_cases(impacts_of_run(run, scene)[0][:CASES], failures=failures)
-    agree, push = (sum(one[key] for one in compared) for key in ("agrees", "pushes"))
-    moves = (
-        f"IAPB moves as the frictionless Newton LCP in {agree} of its {len(compared)} impacts; in "
-        f"{len(compared) - push} an impulse pulls. The largest distance is "
-        f"{max(one['distance'] for one in compared):.2g} of |v⁻|."
-    )
-    verdict = REPRODUCED if agree == len(compared) else MIXED
-    return [Part(moves, verdict, "motion", agree, len(compared)), _solved(study)], {
+    return [_moves(struck, failures), _solved(study)], {
         "solvers": table_from(
             [_solver(study, name) for name in study.solvers],
             3,
@@ -425,6 +456,43 @@ def compare_impacts(
         ),
         "problems": table_from(_problems(study), 3, timed=("time", "note")),
     }
+
+
+def _spread(struck: list[StruckImpact], most: int) -> list[StruckImpact]:
+    """Return at most `most` impacts: the one with the most contacts, and others spread over the
+    motion."""
+    widest = max(range(len(struck)), key=lambda k: struck[k].smooth.contacts)
+    spread = np.linspace(0, len(struck) - 1, most - 1).round().astype(int).tolist()
+    return [struck[k] for k in sorted({widest, *spread})]
+
+
+def _moves(struck: list[StruckImpact], failures: list[Failure]) -> Part:
+    """Return the part on IAPB's velocities and those of the LCP, which are equal if all contacts
+    push."""
+    alike = [one for one in struck if not one.other_law][:CASES]
+    pairs = [attempt(one.smooth.name, partial(_apart, one), failures) for one in alike]
+    compared = [pair for pair in pairs if pair is not None]
+    left_out = Counter(one.other_law for one in struck if one.other_law)
+    besides = "".join(f" Not compared: {many} with {why}." for why, many in left_out.items())
+    if unequal := sum(np.ptp(one.smooth.restitution) > 0.0 for one in alike):
+        besides = f" In {unequal} contacts differ in e: there IAPB uses Poisson's law.{besides}"
+    if not compared:
+        said = f"No impact of IAPB is compared with the LCP.{besides}"
+        return Part(said, NOT_TESTABLE, "motion", optional=True)
+    agree = sum(distance <= SAME for distance, _ in compared)
+    pulled = sum(outside > PUSHED for _, outside in compared)
+    said = (
+        f"IAPB moves as the LCP in {agree} of {len(compared)} impacts; in {pulled} an impulse "
+        f"pulls; largest distance {max(compared)[0]:.2g} |v⁻|.{besides}"
+    )
+    verdict = REPRODUCED if agree == len(compared) else MIXED
+    return Part(said, verdict, "motion", agree, len(compared))
+
+
+def _apart(one: StruckImpact) -> tuple[float, float]:
+    """Return the distances of IAPB's answer from the LCP's velocity, and from impulses that
+    push."""
+    return distances(one.smooth, one.velocity, newton_lcp(one.smooth).velocity)
 
 
 def _solved(study: ProblemStudy) -> Part:

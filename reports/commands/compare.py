@@ -114,7 +114,8 @@ def compare(
             )
             name, lines = topic.key, _problem_lines(found)
     place = out or FOLDER / f"{name}.json"
-    lines += [sentence(part.sentence, "• ") for part in found.parts]
+    new = [part for part in found.parts if part.sentence not in found.answer]
+    lines += [sentence(part.sentence, "• ") for part in new]
     lines += [f"Not computed: {one.case}: {one.error}: {one.reason}" for one in found.failures]
     drawn = None
     if scene is not None:
@@ -154,7 +155,6 @@ def _scene_lines(found: Finding) -> list[str | Table]:
     """Return one page of text: distances, energy and time by world, then the results of the solvers
     on the impacts."""
     table, against = found.tables["worlds"], found.details["against"]
-    others = table.only(name != against for name in table.column("world"))
     far = titled(
         (
             "world",
@@ -167,13 +167,14 @@ def _scene_lines(found: Finding) -> list[str | Table]:
         ),
         [
             (
-                row["world"],
+                "own error" if row["world"] == against else row["world"],
                 *(1e3 * row[f"configuration, {size}"] for size in ("rms", "most", "end")),
                 1e3 * row["velocity, rms"],
                 row["impulse, rms"],
                 row["impulse, end"],
             )
-            for row in others.records()
+            for row in sorted(table.records(), key=lambda row: bool(row["world"] == against))
+            if row["configuration, rms"] is not None
         ],
         3,
     )

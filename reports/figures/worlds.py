@@ -30,7 +30,7 @@ def worlds(table: Table, series: Table) -> Drawn:
     """Draw five curves over time for each world, and bars of the time of a step."""
     names = [str(name) for name in table.column("world")]
     against = next(
-        (row["world"] for row in table.records() if row["configuration, rms"] is None), ""
+        (name for name in names if not any(series.where(world=name).column("configuration"))), ""
     )
     looks = looks_of(names)
     with Plot("worlds", (9.6, 5.4), shape=(2, 3)) as plot:

@@ -23,7 +23,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from functools import partial
 from itertools import product
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -89,7 +89,6 @@ def compare_case(case: ImpactCase) -> dict[str, Any]:
     law = newton_lcp(problem).velocity
     upper, e = case.lower.T, case.restitution
     before, change = upper @ case.velocity, upper @ (v - case.velocity)
-    speed = float(np.linalg.norm(before)) or 1.0
     total, scale = (
         float(np.abs(p).sum()),
         float(np.abs(problem.gamma_minus).max(initial=0.0)) or 1.0,
@@ -99,8 +98,7 @@ def compare_case(case: ImpactCase) -> dict[str, Any]:
         if case.touching is None
         else np.vstack([case.contact_jacobian, case.touching])
     )
-    distance = float(np.linalg.norm(upper @ (v - law))) / speed
-    cone = unpushed_share(problem.factor.T, change) * float(np.linalg.norm(change)) / speed
+    distance, cone = distances(problem, v, law)
     extra = _lost(before, change) - _lost(before, upper @ (law - case.velocity))
     near, far = sorted((distance, cone))
     return {
@@ -120,6 +118,20 @@ def compare_case(case: ImpactCase) -> dict[str, Any]:
         "approaching by the LCP": bool(np.any(rows @ law < -APPROACHING * scale)),
         "outside": _outside(problem.factor, change),
     }
+
+
+def distances(problem: ImpactProblem, velocity: np.ndarray, law: np.ndarray) -> tuple[float, float]:
+    """Return how far v⁺ (d,) is from the law's, and its impulse from {Jᵀp : p >= 0}.
+
+    Both are in the kinetic metric, relative to |v⁻|.
+    """
+    upper = np.linalg.cholesky(cast(np.ndarray, problem.mass_matrix)).T
+    before = upper @ cast(np.ndarray, problem.velocity)
+    change = upper @ velocity - before
+    speed = float(np.linalg.norm(before)) or 1.0
+    apart = float(np.linalg.norm(upper @ (velocity - law)))
+    pulled = unpushed_share(problem.factor.T, change) * float(np.linalg.norm(change))
+    return apart / speed, pulled / speed
 
 
 def _lost(before: np.ndarray, change: np.ndarray) -> float:

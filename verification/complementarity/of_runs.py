@@ -10,13 +10,22 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from iapb import resolve_impact
+from iapb.contact.kernels.contact_set import TOUCHING
 from iapb.errors import IapbError
 from iapb.mechanics.mechanism import Mechanism
 from iapb.run import Run
 from iapb.scene import Scene, find_scene, load_scene
-from iapb.scene.mechanism import mechanism_of, pairs_of, restitutions_of, shapes_of
+from iapb.scene.mechanism import (
+    mechanism_of,
+    pairs_of,
+    restitution_by_pair,
+    restitutions_of,
+    shapes_of,
+)
+from iapb.system import System
 from reference.complementarity.problem import ImpactProblem
 from reference.contact_rows import unit_tangents
 from reference.worlds import run_world
@@ -68,52 +77,93 @@ def impacts_of_run(run: Run, scene: Scene) -> tuple[tuple[ImpactCase, ...], int]
     return tuple(cases), left_out
 
 
-def problems_of_run(run: Run, scene: Scene, most: int) -> tuple[tuple[ImpactProblem, ...], int]:
-    """Return impacts of an IAPB run as problems, and the number of impacts that `impacts_of_run`
-    leaves out.
+class StruckImpact(NamedTuple):
+    """An impact of an IAPB run as problems for solvers, and IAPB's answer.
 
-    It chooses at most `most` impacts: the one with the most contacts, and others spread over the
-    motion. If the scene has friction, each impact gives two problems, without and with friction.
-    IAPB's own impacts have no friction.
+    Attributes
+    ----------
+    smooth : the normal rows with the restitution of each contact
+    rough : the same impact with friction; None if its contacts have none
+    velocity : (d,) v⁺ of IAPB
+    other_law : why IAPB's answer is not to be compared with the frictionless LCP's, and the setting
+        that changes this; "" if it is
     """
-    mechanism, mu = mechanism_of(scene), scene.contact.friction
-    found, left_out = impacts_of_run(run, scene)
-    if not found:
-        return (), left_out
-    taken = [blow for blow in _group_impacts(run, mechanism) if not blow.scaled]
-    widest = max(range(len(taken)), key=lambda k: found[k].contacts)
-    spread = np.linspace(0, len(taken) - 1, most - 1).round().astype(int).tolist()
-    problems = []
-    for k in sorted({widest, *spread}):
-        (mass, normals, v), e = found[k].arrays, found[k].restitution
-        name = f"impact {k + 1} at {run.time[taken[k].step]:.4g} s"
-        problems.append(ImpactProblem.from_impact(mass, normals, v, e, name=name))
-        if mu > 0.0:
-            rows = _with_tangents(run, scene, mechanism, taken[k])
-            problems.append(
-                ImpactProblem.from_impact(
-                    mass,
-                    rows.reshape(-1, mechanism.nv),
-                    v,
-                    e,
-                    mu,
-                    contact_size=rows.shape[1],
-                    name=f"{name}, μ = {mu:g}",
-                )
+
+    smooth: ImpactProblem
+    rough: ImpactProblem | None
+    velocity: Floats
+    other_law: str
+
+
+PER_BODY = "per-body rows (contact.self_collision_rows: relative has the LCP's rows)"
+SCALED = "an impulse scaled by a limit of the device (a larger device.force_limit leaves it whole)"
+RUBBING = "friction (contact.forces: paper leaves it out of impacts)"
+
+
+def problems_of_run(run: Run, scene: Scene) -> list[StruckImpact]:
+    """Return all impacts of an IAPB run as problems, with each contact's own restitution and
+    friction."""
+    system, approach = System(scene), scene.contact.approach_velocity
+    mechanism, found = system.mechanism, list[StruckImpact]()
+    rubbing = bool(run.law_settings.get("friction_in_impacts"))
+    per_body = scene.contact.self_collision_rows == "per_body"
+    for number, blow in enumerate(_group_impacts(run, mechanism), 1):
+        v, mass = blow.v_minus, mechanism.mass_matrix(run.q[blow.step])
+        rows = _rows_of_step(run, mechanism, blow)
+        closing = rows @ v < -approach
+        if not closing.any():
+            continue
+        e, mu = _coefficients(system, run, blow.step, np.array(blow.contacts)[closing])
+        name = f"impact {number} at {run.time[blow.step]:.4g} s"
+        smooth = ImpactProblem.from_impact(mass, rows[closing], v, e, name=name)
+        rough = None
+        if mu.any():
+            both = _with_tangents(run, scene, mechanism, blow)[closing]
+            said = " to ".join(dict.fromkeys(f"{value:g}" for value in (mu.min(), mu.max())))
+            rough = ImpactProblem.from_impact(
+                mass,
+                both.reshape(-1, mechanism.nv),
+                v,
+                e,
+                mu,
+                contact_size=both.shape[1],
+                name=f"{name}, μ = {said}",
             )
-    return tuple(problems), left_out
+        reasons = {PER_BODY: per_body, SCALED: blow.scaled, RUBBING: rubbing and rough is not None}
+        other_law = " and ".join(reason for reason, holds in reasons.items() if holds)
+        found.append(StruckImpact(smooth, rough, blow.v_plus, other_law))
+    return found
+
+
+def _coefficients(
+    system: System, run: Run, step: int, contacts: NDArray[np.int64]
+) -> tuple[Floats, Floats]:
+    """Return e and mu (k,) of contacts of a step, from the shapes that touch there.
+
+    A run records the bodies of a contact, not its shapes: they are those of the nearest contact of
+    these bodies that the geometry gives. A joint's stop has none.
+    """
+    there, table = system.contacts_at(run.q[step], TOUCHING), run.contacts
+    e = np.full(len(contacts), system.scene.contact.restitution)
+    mu = np.zeros(len(contacts))
+    for k, m in enumerate(contacts):
+        same = (there.body_a == table.body_a[m]) & (there.body_b == table.body_b[m])
+        if not same.any():
+            continue
+        away = np.linalg.norm(there.point - table.point[m], axis=1)
+        nearest = np.argmin(np.where(same, away, np.inf))
+        pair = np.array([[there.shape_a[nearest], there.shape_b[nearest]]])
+        e[k], mu[k] = restitution_by_pair(system.scene, pair)[0], system.frictions.by_pair(pair)[0]
+    return e, mu
 
 
 def _with_tangents(run: Run, scene: Scene, mechanism: Mechanism, blow: _GroupImpact) -> Floats:
-    """Return rows (k, s, d) of the approaching contacts: the normal, then one tangent in 2D or two
-    in 3D."""
+    """Return rows (k, s, d) of the contacts: the normal, then one tangent in 2D or two in 3D."""
     normals = run.contacts.normal[blow.contacts]
     tangents = unit_tangents(normals, getattr(scene, "dimensions", 2) == 3)
     directions = np.concatenate([normals[:, None], tangents], axis=1)
-    rows = np.stack(
-        [_rows_of_step(run, mechanism, blow, along) for along in directions.swapaxes(0, 1)], axis=1
-    )
-    return rows[rows[:, 0] @ blow.v_minus < -scene.contact.approach_velocity]
+    each = [_rows_of_step(run, mechanism, blow, along) for along in directions.swapaxes(0, 1)]
+    return np.stack(each, axis=1)
 
 
 class _GroupImpact(NamedTuple):
