@@ -67,7 +67,8 @@ class System:
 
     def __init__(self, scene: Scene) -> None:
         self.given = scene
-        self.scene, self.remarks = chosen_scene(scene)
+        self.scene, chosen = chosen_scene(scene)
+        self.remarks = (*scene.remarks, *chosen)
         scene = self.scene
         self.mechanism: Mechanism = scene_parts.mechanism_of(scene)
         self.shapes = scene_parts.shapes_of(scene)
@@ -251,10 +252,8 @@ class System:
         )
         state.q[:], state.v[:] = self.start
         state.mass_matrix[:] = mechanism.mass_matrix(state.q)
-        if _factored(state.mass_matrix, state.lower):
-            raise ArgumentError(
-                "scene", scene.name, "bodies whose mass matrix is positive definite at the start"
-            )
+        scene_parts.require_moved(scene)
+        _factored(state.mass_matrix, state.lower)
         state.group_of_tree[:] = state.island_of_tree[:] = np.arange(trees)
         state.located_q[:] = np.nan
         return block(state)

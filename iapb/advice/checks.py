@@ -83,6 +83,7 @@ class Start:
     """
 
     def __init__(self, scene: Scene) -> None:
+        mechanism.require_moved(scene)
         self.scene, self.dt, self.spatial = scene, 1.0 / scene.rate, isinstance(scene, SpatialScene)
         self.mechanism, (self.q, self.v) = mechanism.mechanism_of(scene), mechanism.start_of(scene)
         self.shapes = mechanism.shapes_of(scene)

@@ -35,6 +35,7 @@ _CALLED = (
     dynamics.gravity,
     dynamics.inverse_dynamics,
     linalg.all_finite,
+    linalg.cholesky,
     evaluation.biases_at,
     evaluation.centroidal_momentum,
     evaluation.displacements_along,
@@ -47,6 +48,10 @@ _CALLED = (
     kinematics.frame_jacobian,
 )
 _KERNELS = SimpleNamespace(**{kernel.__name__: Entry(kernel) for kernel in _CALLED})
+
+
+ROUNDED = 1e-13  # share of a diagonal entry of M below which a pivot is rounding error
+LIGHTEST = 1e-18  # kg, kg m²: the least pivot of M, whose square must not underflow
 
 
 class _Scratch(threading.local):
@@ -195,6 +200,15 @@ class Mechanism:
         if not _KERNELS.mass_matrices_at(self._parts, self._scratch.parts, places, out):
             self._check_states(places)
         return out
+
+    def unmoved_velocity(self, q: ArrayLike) -> int | None:
+        """Return the first velocity that moves no mass of its own, so that M(q) is not positive
+        definite; None: M is."""
+        mass, lower = self.mass_matrix(q), np.zeros((self.nv, self.nv))
+        _KERNELS.cholesky(mass, lower)
+        least = np.maximum(ROUNDED * np.diagonal(mass), LIGHTEST)
+        unmoved = np.flatnonzero(np.diagonal(lower) ** 2 < least)
+        return int(unmoved[0]) if len(unmoved) else None
 
     def bias(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """Return B(q, v) (d,), Coriolis and centripetal generalized forces (gravity not

@@ -4,21 +4,28 @@ The reader is independent of Pinocchio's, so a comparison of the two also checks
 and layout of q and v are those of `pin.buildModelFromUrdf`: depth first, children of a link in the
 alphabetical order of their joints' names; continuous joints (cos, sin); floating joints as SE(3)
 with velocities in body axes; mimic joints independent. Only planar joints differ: they are the
-engine's own `planar`. Fixed joints stay as bodies without degrees of freedom. Elements of shapes,
-<visual> and <collision>, are ignored. Source of the format: the URDF XML specification
-(wiki.ros.org/urdf/XML).
+engine's own `planar`, in the plane across their axis. Fixed joints stay as bodies without degrees
+of freedom.
+
+Nothing is ignored in silence. What changes the motion and has no counterpart here is refused by
+name; `leave_out` leaves it out. Elements and attributes of other tools are counted in a remark:
+shapes, efforts, speeds, transmissions, simulators. Source of the format: the URDF XML
+specification (wiki.ros.org/urdf/XML).
 """
 
 from __future__ import annotations
 
 import difflib
 import xml.etree.ElementTree as ElementTree
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
 from iapb.errors import ArgumentError
+from iapb.linalg import product
 from iapb.mechanics.bodies import Body
 from iapb.mechanics.joints import Joint
 from iapb.mechanics.rotations import rotation_of
@@ -26,100 +33,281 @@ from iapb.mechanics.structure import turned_inertia
 from iapb.names import one_of
 from iapb.schema import Floats
 
-WITH_AXIS = ("revolute", "continuous", "prismatic")
+WITH_AXIS = ("revolute", "continuous", "prismatic", "planar")
+WITH_RANGE = ("revolute", "prismatic")
+WITH_DYNAMICS = ("revolute", "continuous", "prismatic")
 KIND_OF_TYPE = {
-    **{kind: kind for kind in ("fixed", *WITH_AXIS, "planar")},
+    **{kind: kind for kind in ("fixed", *WITH_AXIS)},
     "floating": "free_flyer",
 }
-# children that are read, and attributes, of the elements that have any
+# children that are read, and attributes, of the elements that are read
 _CHILDREN: dict[str, tuple[str, ...]] = {
     "robot": ("link", "joint"),
     "link": ("inertial",),
-    "joint": ("origin", "parent", "child", "axis"),
+    "joint": ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic"),
     "inertial": ("origin", "mass", "inertia"),
 }
 _ATTRIBUTES: dict[str, tuple[str, ...]] = {
+    "robot": ("name", "version"),
+    "link": ("name",),
+    "joint": ("name", "type"),
     "origin": ("xyz", "rpy", "quat_xyzw"),
     "mass": ("value",),
     "inertia": ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"),
     "axis": ("xyz",),
     "parent": ("link",),
     "child": ("link",),
+    "limit": ("lower", "upper"),
+    "dynamics": ("damping", "friction"),
+    "mimic": ("joint", "multiplier", "offset"),
 }
 _MANY = ("link", "joint")  # an element may hold several of these
-_NEAR = (
-    0.75  # share of letters that agree: inertail is an error, contact and visual are other words
-)
+_SHAPES = ("visual", "collision")
+# share of letters that agree: inertail and xzy are errors, contact and rpy of an axis other words
+_NEAR, _NEAR_ATTRIBUTE = 0.75, 0.6
 MAX_BYTES = 10_000_000  # the largest known robot file has a tenth of this
+FARTHEST = 1e9  # m, rad: a bound beyond it is none, as of rotors that say 1e16
+PARTS = ("joint", "limit", "dynamics", "mimic")  # of a joint that `leave_out` can name
+
+LeaveOut = Mapping[str, Sequence[str]]
+
+
+class Link(NamedTuple):
+    """A link, and what its joint has beside its kind."""
+
+    body: Body
+    name: str = ""  # of the link, where the body takes the start of its joint
+    joint: str = ""  # name of this joint
+    limits: tuple[float, float] | None = None  # [m, rad]
+    damping: float = 0.0  # [N s/m, N m s/rad]
+    friction: float = 0.0  # [N, N m]
+
+
+class UrdfRobot(NamedTuple):
+    """The links of a robot, parents first, and sentences on what its file says in vain."""
+
+    links: list[Link]
+    remarks: tuple[str, ...]
 
 
 def read_urdf(path: str | Path, floating_base: bool = False) -> list[Body]:
-    """Return the robot's links as bodies, parents first.
+    """Return the robot's links as bodies, parents first; see `read_robot`."""
+    return [link.body for link in read_robot(path, floating_base).links]
+
+
+def read_robot(
+    path: str | Path, floating_base: bool = False, leave_out: LeaveOut | None = None
+) -> UrdfRobot:
+    """Return the robot's links with limits, damping and friction of their joints.
 
     Parameters
     ----------
     path : path of the URDF file
     floating_base : bool
         True: the root link moves freely (free flyer); False: it is fixed to the world.
+    leave_out : mapping
+        Parts of joints to leave out, by joint: limit, dynamics, mimic, or joint: the joint itself,
+        with the links that it alone carries.
 
     Raises
     ------
     ArgumentError
-        The file cannot be read, is not a URDF robot, or one of its elements is wrong; the message
-        names the file, the element and what was expected.
+        The file cannot be read, is not a URDF robot, or one of its elements is wrong or without a
+        counterpart; the message names the file, the element and what was expected.
     """
-    robot = parse_robot(Path(path))
+    robot, ignored = parse_robot(Path(path))
+    dropped = _left_out(robot, leave_out or {})
     inertials = {
         name: _inertial(element) for name, element in elements_by_name(robot, "link").items()
     }
-    held: dict[
-        str, tuple[str, Joint, tuple[Floats, Floats]]
-    ] = {}  # link -> parent, joint and placement
+    joints = _Joints(ignored)
+    held: dict[str, tuple[str, Link]] = {}  # link -> its parent, and the link without inertia
     children: dict[str, list[str]] = {name: [] for name in inertials}
-    for _, element in sorted(
+    for name, element in sorted(
         elements_by_name(robot, "joint").items(), key=lambda item: item[0].encode()
     ):
-        where, ends = where_of(element), {tag: element.find(tag) for tag in ("parent", "child")}
-        parent, child = ("" if end is None else end.get("link", "") for end in ends.values())
-        for tag, link in zip(ends, (parent, child), strict=True):
-            if link not in inertials:
-                raise ArgumentError(
-                    f"{where} {tag}", link, f'<{tag} link="..."/> with the name of a <link>'
-                )
+        where = where_of(element)
+        parent, child = (_end(element, tag, inertials) for tag in ("parent", "child"))
         if child in held:
             raise ArgumentError(
-                f"{where} child", child, "a link that is the child of no other joint"
+                f"{where} child",
+                child,
+                f"a link that is the child of no other joint, for loops are not simulated; "
+                f"{_leaving(name, 'joint')}",
             )
-        held[child] = parent, _joint(element), origin_of(element, where)
+        body = Body(child, parent, _joint(element), origin_of(element, where), *inertials[child])
+        held[child] = parent, joints.link(element, body)
         children[parent].append(child)
-    roots = [name for name in inertials if name not in held]
+    joints.refuse_empty_ranges()
+    roots = [name for name in inertials if name not in held and name not in dropped]
     if len(roots) != 1:
         raise ArgumentError("links without a parent", roots, "exactly one, the root")
-    bodies = [
-        Body(
-            roots[0],
-            None,
-            Joint("free_flyer" if floating_base else "fixed"),
-            _HERE,
-            *inertials[roots[0]],
-        )
-    ]
-    stack = children[roots[0]][::-1]  # instead of recursion, for any depth
-    while stack:
-        link = stack.pop()
-        bodies.append(Body(link, *held[link], *inertials[link]))
-        stack.extend(children[link][::-1])
-    if lost := sorted(inertials.keys() - {body.name for body in bodies}):
+    base = Joint("free_flyer" if floating_base else "fixed")
+    links = [Link(Body(roots[0], None, base, _HERE, *inertials[roots[0]]), roots[0])]
+    for link in _carried(children, roots):
+        links += _with_plane(held[link][1])
+    reached = {*roots, *_carried(children, roots), *dropped, *_carried(children, dropped)}
+    if lost := sorted(inertials.keys() - reached):
         raise ArgumentError(
             "links",
             lost,
             f"joints that connect each link to the root {roots[0]!r}; the joints of "
             "these links form a loop",
         )
-    return bodies
+    return UrdfRobot(links, joints.remarks())
 
 
 _HERE = (np.eye(3), np.zeros(3))
+
+
+def _left_out(robot: ElementTree.Element, leave_out: LeaveOut) -> list[str]:
+    """Remove the parts of joints that are left out; return the links that no joint carries
+    then."""
+    joints, dropped = elements_by_name(robot, "joint"), list[str]()
+    for name, parts in leave_out.items():
+        if name not in joints:
+            raise ArgumentError("leave_out", name, one_of(name, joints, "a joint of it: "))
+        element = joints[name]
+        for part in parts:
+            found = element.find(part)
+            if part == "joint":
+                robot.remove(element)
+                child = element.find("child")
+                dropped.append("" if child is None else child.get("link", ""))
+            elif found is not None:
+                element.remove(found)
+    kept = {
+        child.get("link")
+        for joint in robot.findall("joint")
+        if (child := joint.find("child")) is not None
+    }
+    return [link for link in dropped if link not in kept]
+
+
+def _leaving(joint: str, part: str) -> str:
+    return f"leave_out: {{{joint}: [{part}]}} leaves it out"
+
+
+def _end(joint: ElementTree.Element, tag: str, links: Mapping[str, Any]) -> str:
+    """Return the name of a joint's parent or child."""
+    end = joint.find(tag)
+    link = "" if end is None else end.get("link", "")
+    if link not in links:
+        raise ArgumentError(
+            f"{where_of(joint)} {tag}", link, f'<{tag} link="..."/> with the name of a <link>'
+        )
+    return link
+
+
+def _carried(children: Mapping[str, list[str]], roots: Sequence[str]) -> Iterator[str]:
+    """Yield the links that the roots carry, depth first."""
+    stack = [link for root in roots[::-1] for link in children.get(root, [])[::-1]]
+    while stack:  # instead of recursion, for any depth
+        link = stack.pop()
+        yield link
+        stack.extend(children[link][::-1])
+
+
+def _with_plane(link: Link) -> list[Link]:
+    """Return the link; a planar joint across another axis than z first gets a frame with this
+    axis."""
+    body = link.body
+    if body.joint.kind != "planar" or body.joint.axis == (0.0, 0.0, 1.0):
+        return [link]
+    turn, (rotation, position) = _to_axis(body.joint.unit_axis), body.placement
+    frame = Body(
+        f"{body.name}_plane", body.parent, Joint("planar"), (product(rotation, turn), position)
+    )
+    inertial = body.mass, body.center_of_mass, body.inertia
+    fixed = Body(body.name, frame.name, Joint("fixed"), (turn.T + 0.0, np.zeros(3)), *inertial)
+    return [link._replace(body=frame), Link(fixed)]
+
+
+def _to_axis(axis: Floats) -> Floats:
+    """Return a rotation matrix whose third column is the unit axis."""
+    across = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    first = np.cross(across, axis)
+    first /= np.sqrt((first * first).sum())
+    return np.column_stack([first, np.cross(axis, first), axis])
+
+
+class _Joints:
+    """Reads limits and dynamics of the joints, and keeps what is to be said about them."""
+
+    def __init__(self, ignored: Counter[str]) -> None:
+        self.ignored = ignored
+        self.empty: list[str] = []  # joints whose range is a point
+        self.unlimited: list[str] = []
+
+    def link(self, element: ElementTree.Element, body: Body) -> Link:
+        """Return a body with what its joint has."""
+        damping, friction = (self._dynamics(element, name) for name in ("damping", "friction"))
+        self.ignored["<mimic>, the joint moves by itself"] += element.find("mimic") is not None
+        name = str(element.get("name"))
+        return Link(body, body.name, name, self._limits(element), damping, friction)
+
+    def _limits(self, element: ElementTree.Element) -> tuple[float, float] | None:
+        limit, kind, name = element.find("limit"), element.get("type"), str(element.get("name"))
+        if limit is None:
+            self.unlimited += [name] * (kind in WITH_RANGE)
+            return None
+        where = f"{where_of(element)} limit"
+        lower, upper = (_number(where, limit, bound, "0") for bound in ("lower", "upper"))
+        if kind not in WITH_RANGE:
+            given = "lower" in limit.attrib or "upper" in limit.attrib
+            if given and kind in ("planar", "floating"):
+                raise ArgumentError(where, kind, f"no range; {_leaving(name, 'limit')}")
+            self.ignored[f"<limit> of {kind} joints"] += given
+            return None
+        if lower > upper:
+            raise ArgumentError(where, [lower, upper], "lower <= upper")
+        self.empty += [name] * (lower == upper)
+        if max(-lower, upper) > FARTHEST and min(-lower, upper) > FARTHEST:
+            return None
+        return max(lower, -FARTHEST), min(upper, FARTHEST)
+
+    def _dynamics(self, element: ElementTree.Element, name: str) -> float:
+        """Return damping or friction of a joint."""
+        dynamics, kind = element.find("dynamics"), element.get("type")
+        if dynamics is None:
+            return 0.0
+        where = f"{where_of(element)} dynamics"
+        value = _number(where, dynamics, name, "0")
+        if value < 0.0:
+            raise ArgumentError(f"{where} {name}", value, "a number >= 0")
+        if kind in WITH_DYNAMICS or value == 0.0:
+            return value
+        if kind != "fixed":
+            leaving = _leaving(str(element.get("name")), "dynamics")
+            raise ArgumentError(f"{where} {name}", value, f"none of a {kind} joint; {leaving}")
+        self.ignored["<dynamics> of fixed joints"] += 1
+        return 0.0
+
+    def refuse_empty_ranges(self) -> None:
+        """Refuse joints that their range locks, for a limit here lets the joint move."""
+        if self.empty:
+            leaving = ", ".join(f"{name}: [limit]" for name in self.empty)
+            raise ArgumentError(
+                "<limit>",
+                self.empty,
+                "lower < upper (both are 0 by default, which locks the joint); "
+                f"leave_out: {{{leaving}}} lets it turn without limits",
+            )
+
+    def remarks(self) -> tuple[str, ...]:
+        """Return sentences on what has no limits and on what is ignored."""
+        said = []
+        if self.unlimited:
+            said.append(f"without <limit>, so without limits: {', '.join(self.unlimited)}")
+        if ignored := +self.ignored:  # without counts of zero
+            counts = (f"{what} ({count})" for what, count in ignored.items())
+            shapes = any(f"<{tag}>" in ignored for tag in _SHAPES)
+            said.append(f"ignored: {', '.join(counts)}" + "; the scene gives shapes" * shapes)
+        return tuple(said)
+
+
+def _number(where: str, element: ElementTree.Element, name: str, default: str) -> float:
+    return float(numbers_in(f"{where} {name}", element.get(name, default), 1)[0])
 
 
 def _inertial(link: ElementTree.Element) -> tuple[Any, ...]:
@@ -145,7 +333,8 @@ def _inertial(link: ElementTree.Element) -> tuple[Any, ...]:
 def _joint(element: ElementTree.Element) -> Joint:
     where, kind, axis = where_of(element), element.get("type", ""), element.find("axis")
     if kind not in KIND_OF_TYPE:
-        raise ArgumentError(f"{where} type", kind, one_of(kind, KIND_OF_TYPE))
+        leaving = _leaving(str(element.get("name")), "joint")
+        raise ArgumentError(f"{where} type", kind, f"{one_of(kind, KIND_OF_TYPE)}; {leaving}")
     along = np.array((1.0, 0.0, 0.0))  # default of the specification
     if kind in WITH_AXIS and axis is not None:
         along = numbers_in(f"{where} axis", axis.get("xyz"), 3)
@@ -163,9 +352,9 @@ class _Builder(ElementTree.TreeBuilder):
         )
 
 
-def parse_robot(path: Path) -> ElementTree.Element:
-    """Return the robot element of a URDF file; an ArgumentError says what is wrong with the
-    file."""
+def parse_robot(path: Path) -> tuple[ElementTree.Element, Counter[str]]:
+    """Return the robot element of a URDF file, and how often it has what is not read; an
+    ArgumentError says what is wrong with the file."""
     try:
         if path.exists() and not path.is_file():
             raise ValueError("no regular file")  # a pipe would be waited for
@@ -190,13 +379,14 @@ def parse_robot(path: Path) -> ElementTree.Element:
         raise ArgumentError("URDF file", str(path), f"well-formed XML ({error})") from None
     if robot.tag != "robot":
         raise ArgumentError("URDF file", f"<{robot.tag}>", "a <robot> element at the top")
-    _check_spelling(robot, "<robot>")
-    return robot
+    ignored: Counter[str] = Counter()
+    _check_spelling(robot, "<robot>", ignored)
+    return robot, ignored
 
 
-def _check_spelling(element: ElementTree.Element, where: str) -> None:
-    """Raise ArgumentError for a misspelt element, an unknown attribute or a repeated element of
-    what is read.
+def _check_spelling(element: ElementTree.Element, where: str, ignored: Counter[str]) -> None:
+    """Raise ArgumentError for misspelt or repeated elements and misspelt attributes of what is
+    read; count the others.
 
     Elements of other tools (<gazebo>, <transmission>, <contact> …) are allowed, as the format
     intends. A name that nearly equals an element that is read counts as an error: otherwise a link
@@ -204,12 +394,13 @@ def _check_spelling(element: ElementTree.Element, where: str) -> None:
     """
     read, attributes = (table.get(str(element.tag), ()) for table in (_CHILDREN, _ATTRIBUTES))
     for name, value in element.attrib.items():
-        if (
-            attributes and name not in attributes and not name.startswith("{")
-        ):  # {…}: of another XML namespace
+        if name in attributes:
+            continue
+        if difflib.get_close_matches(name, attributes, n=1, cutoff=_NEAR_ATTRIBUTE):
             raise ArgumentError(
                 f"{where} {name}", value, one_of(name, attributes, "one of its attributes: ")
             )
+        ignored[f"{name} of <{element.tag}>"] += 1
     seen: set[str] = set()
     for child in element:
         tag = str(child.tag)
@@ -217,11 +408,14 @@ def _check_spelling(element: ElementTree.Element, where: str) -> None:
             raise ArgumentError(f"{where} <{tag}>", "given twice", "one of them")
         if tag in read:
             seen.add(tag)
-            _check_spelling(child, where_of(child) if element.tag == "robot" else f"{where} {tag}")
+            inside = where_of(child) if element.tag == "robot" else f"{where} {tag}"
+            _check_spelling(child, inside, ignored)
         elif near := difflib.get_close_matches(tag, read, n=1, cutoff=_NEAR):
             raise ArgumentError(
                 f"{where} <{tag}>", tag, f"<{near[0]}>; is it misspelt? Rename it if not"
             )
+        else:
+            ignored[f"<{tag}>"] += 1
 
 
 def elements_by_name(robot: ElementTree.Element, tag: str) -> dict[str, ElementTree.Element]:

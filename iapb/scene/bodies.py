@@ -28,7 +28,6 @@ from pydantic import (
 
 from iapb.mechanics.joints import KINDS
 from iapb.scene.parts import (
-    SMALLEST_POSITIVE,
     Name,
     NonNegative,
     Number,
@@ -235,9 +234,8 @@ class AnyBody(ScenePart):
     """A rigid body of a tree.
 
     The joint frame has the position `origin` and the rotation `angle` or `rpy` in the parent body's
-    frame. The joint moves the body frame relative to the joint frame. Every moving body has the
-    mass or inertia that its joint accelerates, so the mass matrix is positive definite in every
-    configuration.
+    frame. The joint moves the body frame relative to the joint frame. A body may be massless if
+    those that it carries give its joint mass to move (`iapb.scene.mechanism.unmoved_body`).
     """
 
     center_of_mass: Any
@@ -305,7 +303,7 @@ class AnyBody(ScenePart):
         )
 
     @field_validator(
-        "axis", "mass", "position", "velocity", "joint_damping", "joint_limits", check_fields=False
+        "axis", "position", "velocity", "joint_damping", "joint_limits", check_fields=False
     )
     @classmethod
     def _fits_the_joint(cls, given: Any, info: ValidationInfo) -> Any:
@@ -321,12 +319,7 @@ class AnyBody(ScenePart):
                 f"the direction of the {joint} joint",
             )
             return given and with_direction(given)
-        if field == "mass":
-            require(
-                given >= SMALLEST_POSITIVE or joint not in ("prismatic", "planar", "free_flyer"),
-                f"a mass >= {SMALLEST_POSITIVE} kg: the {joint} joint moves it",
-            )
-        elif field == "joint_limits" and given is not None:
+        if field == "joint_limits" and given is not None:
             start = (info.data.get("position") or given)[0]
             require(joint in ("revolute", "prismatic"), f"no limits: a {joint} joint has none")
             require(given[0] < given[1], "two numbers, the smaller one first")
@@ -372,32 +365,16 @@ class Body(AnyBody, _PlanarJoint):
     )
     shapes: Shapes[Shape] = ()
 
-    @field_validator("inertia")
-    @classmethod
-    def _turned_by_the_joint(cls, inertia: float, info: ValidationInfo) -> float:
-        joint, mass, center = (info.data.get(name) for name in ("joint", "mass", "center_of_mass"))
-        require(
-            joint != "planar" or inertia >= SMALLEST_POSITIVE,
-            f"a moment of inertia >= {SMALLEST_POSITIVE} kg m2: the planar joint turns it",
-        )
-        if joint == "revolute" and mass is not None and center is not None:
-            require(
-                inertia + mass * sum(c * c for c in center) >= SMALLEST_POSITIVE,
-                "a moment of inertia > 0, or a mass whose centre is off the revolute joint's axis",
-            )
-        return inertia
-
 
 class _SpatialJoint(ScenePart):
     name: Name = Field(description="the body's name")
     parent: Name = Field(WORLD, description="the body it is jointed to; default: world")
-    joint: Literal["fixed", "revolute", "continuous", "prismatic", "spherical", "free_flyer"] = (
-        Field(
-            description="how "
-            "it moves; position: revolute [rad], continuous cos, sin, prismatic [m], spherical "
-            "quaternion x, y, z, w, "
-            "free_flyer x, y, z [m] and quaternion"
-        )
+    joint: Literal[
+        "fixed", "revolute", "continuous", "prismatic", "planar", "spherical", "free_flyer"
+    ] = Field(
+        description="how it moves; position: revolute [rad], continuous cos, sin, prismatic [m], "
+        "planar x, y [m], theta [rad], spherical quaternion x, y, z, w, free_flyer x, y, z [m] and "
+        "quaternion"
     )
     axis: Axis[Vector3] = None
     origin: Origin[Vector3] = ORIGIN
@@ -421,19 +398,12 @@ class SpatialBody(AnyBody, _SpatialJoint):
 
     @field_validator("inertia")
     @classmethod
-    def _turned_by_the_joint(cls, inertia: Any, info: ValidationInfo) -> Any:
-        matrix, free = (
-            inertia_matrix(inertia),
-            info.data.get("joint") in ("spherical", "free_flyer"),
-        )
+    def _symmetric(cls, inertia: Any) -> Any:
+        matrix = inertia_matrix(inertia)
         rounding = 1e-12 * np.abs(matrix).max()
         require(
             np.ndim(inertia[0]) == 0 or bool((abs(np.subtract(inertia, matrix)) <= rounding).all()),
             "a symmetric matrix",
-        )
-        require(
-            not free or np.linalg.eigvalsh(matrix)[0] >= SMALLEST_POSITIVE,
-            f"principal moments >= {SMALLEST_POSITIVE} kg m2: the joint turns about all axes",
         )
         return inertia
 

@@ -15,6 +15,7 @@ import numpy as np
 from iapb.contact import geometry
 from iapb.contact.geometry import Shapes, candidate_pairs, frame_along, make_shapes
 from iapb.contact.kernels.world import Stops
+from iapb.errors import ArgumentError
 from iapb.linalg import product
 from iapb.mechanics.bodies import Body
 from iapb.mechanics.joints import KINDS, Joint
@@ -22,6 +23,7 @@ from iapb.mechanics.mechanism import Mechanism
 from iapb.mechanics.rotations import rotation_of
 from iapb.scene.bodies import WORLD, inertia_matrix
 from iapb.scene.model import Scene, SpatialScene
+from iapb.scene.parts import SMALLEST_POSITIVE
 from iapb.schema import Floats, Indices, Integers
 
 Pairs = Indices
@@ -70,6 +72,42 @@ def start_of(scene: Scene) -> tuple[Floats, Floats]:
     q = [x for body in scene.bodies for x in body.position]
     v = [x for body in scene.bodies for x in body.velocity]
     return np.array(q, np.float64), np.array(v, np.float64)
+
+
+def unmoved_body(scene: Scene) -> tuple[int, str, str] | None:
+    """Return the first body whose joint moves no mass at the start, its joint, and what was
+    expected; None if M is positive definite.
+
+    M is computed only if a joint moves neither mass nor inertia of its own body, which a body
+    that it carries may have.
+    """
+    if all(_moves_its_own(body) for body in scene.bodies):
+        return None
+    mechanism = mechanism_of(scene)
+    k = mechanism.unmoved_velocity(start_of(scene)[0])
+    if k is None:
+        return None
+    i = int(mechanism.arrays.dof_body[k])
+    name, turns = scene.bodies[i].name, mechanism.arrays.dof_rotates[k]
+    alone = f"no mass {'turns about it' if turns else 'moves along it'}"
+    if mechanism.mass_matrix(start_of(scene)[0])[k, k] > SMALLEST_POSITIVE:
+        alone = "no mass lies between it and joints that move alike"
+    return i, scene.bodies[i].joint, f"mass or inertia that it moves ({name}: {alone})"
+
+
+def _moves_its_own(body: Any) -> bool:
+    """Return whether a joint is fixed, or its body has mass and inertia about every axis."""
+    inertia = body.inertia
+    if np.ndim(inertia):
+        inertia = np.linalg.eigvalsh(inertia_matrix(inertia))[0]
+    return body.joint == "fixed" or bool(min(body.mass, inertia) >= SMALLEST_POSITIVE)
+
+
+def require_moved(scene: Scene) -> None:
+    """Raise ArgumentError if a joint moves no mass at the start; see `unmoved_body`."""
+    if unmoved := unmoved_body(scene):
+        i, joint, expected = unmoved
+        raise ArgumentError(f"joint of {scene.bodies[i].name}", joint, expected)
 
 
 def wrench_of(scene: Scene, time: float) -> Floats:

@@ -313,6 +313,7 @@ class Scene(ScenePart):
     )  # as read, or written at first use for a scene made of values
     _about: str = PrivateAttr("")  # comment above a text that is not yet written
     _file: str = PrivateAttr("")  # file that the text was read from, if any
+    _remarks: tuple[str, ...] = PrivateAttr(())  # on the files of its robots
 
     @field_validator("duration")
     @classmethod
@@ -364,6 +365,11 @@ class Scene(ScenePart):
         """Contact fields that the toolkit chooses, since the scene gives no value for them."""
         fields = () if self.contact.forces == "paper" else ("stiffness", "damping")
         return tuple(name for name in fields if name not in self.contact.model_fields_set)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Sentences on what the files of its robots say in vain, and on starts that were moved."""
+        return self._remarks
 
     @property
     def source_text(self) -> str:
@@ -421,6 +427,7 @@ class Scene(ScenePart):
             raise SceneError(
                 mistakes_of(failure, f"scene {self.name} with new values", plain)
             ) from failure
+        made._remarks = self._remarks
         made._about = f"{self.name} with new values for {', '.join(values) or 'nothing'}"
         return made
 

@@ -13,9 +13,10 @@ from pydantic import ValidationError
 from iapb.errors import ArgumentError, Mistake, SceneError, shown
 from iapb.names import nearest, one_of
 from iapb.scene.document import MAX_CHARACTERS, Document
+from iapb.scene.mechanism import unmoved_body
 from iapb.scene.model import Scene, scene_kind
-from iapb.scene.parts import ScenePart, mistakes_of
-from iapb.scene.robots import with_robots
+from iapb.scene.parts import ScenePart, mistakes_of, written
+from iapb.scene.robots import told, with_robots
 
 Part = TypeVar("Part", bound=ScenePart)
 
@@ -128,12 +129,21 @@ def scene_from_text(text: str, file: str = "(text)") -> Scene:
         the text is not a valid scene; the error lists all mistakes.
     """
     document = Document(text, file)
-    given, mistakes = with_robots(document)
-    scene = checked(scene_kind(given), given, document, mistakes)
+    given, added = with_robots(document)
+    try:
+        scene = checked(scene_kind(given), given, document, added.mistakes)
+        if unmoved := unmoved_body(scene):
+            path = ("bodies", unmoved[0], "joint")
+            name = written(path) if added.origins else f"joint of {scene.bodies[unmoved[0]].name}"
+            where = Mistake(file, *document.place(path), name, *unmoved[1:])
+            raise SceneError([where])
+    except SceneError as failure:
+        raise SceneError(told(failure.mistakes, added, document)) from None
     if given is document.value:
         scene._source_text, scene._file = text, file if file != "(text)" else ""
     else:
         scene._about = f"{scene.name} with its robots as bodies"
+        scene._remarks = tuple(added.remarks)
     return scene
 
 
@@ -150,7 +160,7 @@ def checked(
     try:
         part = kind.model_validate(given)
     except ValidationError as failure:
-        mistakes = mistakes + mistakes_of(failure, document.file, document.value, document.place)
+        mistakes = mistakes + mistakes_of(failure, document.file, given, document.place)
     mistakes = mistakes + document.mistakes
     if mistakes:
         raise SceneError(sorted(mistakes, key=lambda mistake: (mistake.line, mistake.column)), what)

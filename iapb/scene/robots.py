@@ -5,7 +5,8 @@
          0.05}]}, position: {upper_arm: [0.3]}}
 
 By default no link can touch anything. `shapes` gives shapes link by link; <collision> elements of
-the file are ignored.
+the file are ignored. Limits, damping and friction of the joints are those of the file. A start that
+is not given is the neutral one, or the nearest one within the limits.
 
 Each link becomes the body ``<robot>_<link>``, with ``_`` for dots and blanks. After reading, the
 scene has the bodies themselves, so its text and its runs do not need the URDF file. Paths are
@@ -15,8 +16,10 @@ relative to the scene file and must stay in its folder.
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field, ValidationError
@@ -28,6 +31,9 @@ from iapb.names import one_of
 from iapb.scene.bodies import ORIGIN, WORLD, SpatialBody, SpatialShape
 from iapb.scene.document import Document
 from iapb.scene.parts import Name, Number, ScenePart, Text, Truth, Vector3, mistakes_of
+
+if TYPE_CHECKING:
+    from iapb.mechanics.urdf import Link
 
 MAX_ROBOTS = 100  # in one scene; each one is a file to read
 
@@ -54,41 +60,82 @@ class Robot(ScenePart):
     velocity: dict[str, tuple[Number, ...]] = Field(
         default_factory=dict, description="the same for velocities"
     )
+    leave_out: dict[str, tuple[Literal["joint", "limit", "dynamics", "mimic"], ...]] = Field(
+        default_factory=dict,
+        description="parts of joints to leave out, by joint: limit, dynamics, mimic; or joint, the "
+        "joint itself with the links that it alone carries",
+    )
 
 
-def with_robots(document: Document) -> tuple[Any, list[Mistake]]:
-    """Return the plain values of a scene with its robots turned into bodies, and the mistakes
-    found."""
-    given, mistakes, file = document.value, [], document.file
+class Added(NamedTuple):
+    """What the robots of a scene add to it."""
+
+    mistakes: list[Mistake]
+    remarks: list[str]
+    origins: list[tuple[int, str, str]]  # of each body: its robot, link and joint
+
+
+def with_robots(document: Document) -> tuple[Any, Added]:
+    """Return the plain values of a scene with its robots turned into bodies, and what they
+    add."""
+    given, added, file = document.value, Added([], [], []), document.file
     if not (
         isinstance(given, dict) and "dimensions" in given and isinstance(given.get("robots"), list)
     ):
-        return given, []
+        return given, added
     listed, robots = given.get("bodies", []), given["robots"]
     if len(robots) > MAX_ROBOTS:
         place = document.place(("robots",))
-        return given, [
-            Mistake(file, *place, "robots", f"{len(robots)} robots", f"at most {MAX_ROBOTS} robots")
-        ]
+        said = f"{len(robots)} robots", f"at most {MAX_ROBOTS} robots"
+        added.mistakes.append(Mistake(file, *place, "robots", *said))
+        return given, added
     bodies: list[dict[str, Any]] = []
     for i, item in enumerate(robots):
         try:
-            bodies += bodies_of(Robot.model_validate(item), Path(file).parent)
+            robot = Robot.model_validate(item)
+            bodies += bodies_of(robot, Path(file).parent, added, i)
         except ValidationError as failure:
-            mistakes += mistakes_of(failure, file, given, document.place, ("robots", i))
+            added.mistakes.extend(mistakes_of(failure, file, given, document.place, ("robots", i)))
         except ArgumentError as failure:
             field = failure.argument.split(" ")[0]
             place = document.place(("robots", i, field if field in Robot.model_fields else "urdf"))
             where = f"robots[{i}].{failure.argument}"
-            mistakes.append(Mistake(file, *place, where, shown(failure.value), failure.expected))
+            added.mistakes.append(
+                Mistake(file, *place, where, shown(failure.value), failure.expected)
+            )
     kept = {key: value for key, value in given.items() if key != "robots"}
     return kept | {
         "bodies": [*(listed or ()), *bodies] if isinstance(listed, list | None) else listed
-    }, mistakes
+    }, added
 
 
-def bodies_of(robot: Robot, folder: Path) -> list[dict[str, Any]]:
-    """Return the robot's links as plain bodies of a spatial scene.
+def told(mistakes: Sequence[Mistake], added: Added, document: Document) -> list[Mistake]:
+    """Return mistakes of a scene with robots: those of a robot's body name its link and joint, and
+    a robot that is refused adds no second mistake, such as a hand without a body."""
+    listed = document.value.get("bodies") if isinstance(document.value, dict) else None
+    first, found = len(listed) if isinstance(listed, list) else 0, []
+    for mistake in mistakes:
+        if added.mistakes and _FOLLOWS.match(f"{mistake.path} {mistake.expected}"):
+            continue
+        match = re.match(r"bodies\[(\d+)\]\.?(.*)", mistake.path)
+        if match and first <= int(match[1]) < first + len(added.origins):
+            i, link, joint = added.origins[int(match[1]) - first]
+            place = document.place(("robots", i))
+            path = f"robots[{i}]: {match[2]} of link {link!r}"
+            path += f", joint {joint!r}" * bool(joint)
+            mistake = replace(mistake, line=place[0], column=place[1], path=path)
+        found.append(mistake)
+    return found
+
+
+# mistakes that the missing bodies of a refused robot make
+_FOLLOWS = re.compile(
+    r"bodies |hand\.body |\S+\.parent |bodies\[0\]\.joint at least|device |couplings "
+)
+
+
+def bodies_of(robot: Robot, folder: Path, added: Added, number: int) -> list[dict[str, Any]]:
+    """Return the robot's links as plain bodies of a spatial scene; add remarks and origins.
 
     Raises
     ------
@@ -97,7 +144,7 @@ def bodies_of(robot: Robot, folder: Path) -> list[dict[str, Any]]:
         exist.
     """
     from iapb.mechanics.rotations import angles_of, rotation_of
-    from iapb.mechanics.urdf import read_urdf
+    from iapb.mechanics.urdf import read_robot
 
     path, root = Path(robot.urdf), folder.resolve()
     leads_out = "\0" in robot.urdf or path.is_absolute() or ".." in path.parts
@@ -105,43 +152,70 @@ def bodies_of(robot: Robot, folder: Path) -> list[dict[str, Any]]:
         root
     ):  # after following symbolic links
         raise ArgumentError("urdf", robot.urdf, "a relative path inside the scene's folder")
-    links = read_urdf(root / path, robot.floating)
-    names = sorted(link.name for link in links)
+    links, remarks = read_robot(root / path, robot.floating, robot.leave_out)
+    names = sorted(link.body.name for link in links)
     for field in ("shapes", "position", "velocity"):
         for name in getattr(robot, field):
             if name not in names:
                 raise ArgumentError(
                     f"{field} of robot {robot.name}", name, one_of(name, names, "a link of it: ")
                 )
+    added.remarks.extend(f"robot {robot.name}, {robot.urdf}: {remark}" for remark in remarks)
     bodies = []
     for link in links:
-        rotation, origin = link.placement
-        if link.parent is None:
+        body = link.body
+        rotation, origin = body.placement
+        if body.parent is None:
             turn = rotation_of(robot.rpy)
             rotation, origin = (
                 product(turn, rotation),
                 product(turn, origin) + np.array(robot.origin),
             )
-        kind = KINDS[link.joint.kind]
+        kind = KINDS[body.joint.kind]
+        start = _start(robot, link)
+        if start != (robot.position.get(link.name) or kind.neutral):
+            added.remarks.append(
+                f"robot {robot.name}: {link.name} starts at {start[0]:g}, the limit of joint "
+                f"{link.joint}, for 0 is outside its limits {list(link.limits or ())}"
+            )
+        added.origins.append((number, body.name, link.joint))
         bodies.append(
             {
-                "name": _body_name(robot, link.name),
-                "parent": WORLD if link.parent is None else _body_name(robot, link.parent),
+                "name": _body_name(robot, body.name),
+                "parent": WORLD if body.parent is None else _body_name(robot, body.parent),
                 "joint": kind.name,
-                "axis": list(link.joint.axis) if kind.name in SpatialBody.with_axis else None,
+                "axis": list(body.joint.axis) if kind.name in SpatialBody.with_axis else None,
                 "origin": origin.tolist(),
                 "rpy": list(angles_of(rotation)),
-                "center_of_mass": link.center_of_mass.tolist(),
-                "mass": link.mass,
-                "inertia": link.inertia.tolist(),
+                "center_of_mass": body.center_of_mass.tolist(),
+                "mass": body.mass,
+                "inertia": body.inertia.tolist(),
                 "shapes": [
-                    shape.model_dump(mode="json") for shape in robot.shapes.get(link.name, ())
+                    shape.model_dump(mode="json") for shape in robot.shapes.get(body.name, ())
                 ],
-                "position": list(robot.position.get(link.name, kind.neutral)),
+                "position": list(start),
                 "velocity": list(robot.velocity.get(link.name, ())),
+                "joint_limits": link.limits and list(link.limits),
+                "joint_damping": [link.damping] * (link.damping > 0.0),
             }
         )
     return bodies
+
+
+def _start(robot: Robot, link: Link) -> tuple[float, ...]:
+    """Return the start of a link's joint: as given, else the neutral one or the nearest within the
+    limits."""
+    neutral, given = KINDS[link.body.joint.kind].neutral, robot.position.get(link.name)
+    if link.limits is None or (given and len(given) != 1):
+        return given or neutral
+    low, high = link.limits
+    if given and not low <= given[0] <= high:
+        raise ArgumentError(
+            f"position of robot {robot.name}, link {link.name}",
+            given[0],
+            f"a start within the limits [{low:g}, {high:g}] of joint {link.joint}",
+        )
+    return given or (min(max(neutral[0], low), high),)
 
 
 def _body_name(robot: Robot, link: str) -> str:

@@ -21,7 +21,8 @@ def check(
 ) -> Answer:
     """Warn of problems that would make a run of SCENE worthless, with values to set; end with 3
     then."""
-    source, remarks = chosen_scene(scene_given(scene, set_))
+    source, chosen = chosen_scene(scene_given(scene, set_))
+    remarks = (*source.remarks, *chosen)
     law = find_world(world).law
     law = law.within(source) if hasattr(law, "within") else law
     cautions, (said, refused) = check_scene(source, law), cost_in_words(source, law)

@@ -57,7 +57,7 @@ def test_a_link_and_its_joint_are_read_as_the_specification_says(read):
 def test_children_come_depth_first_in_the_order_of_joint_names_with_their_kinds(read):
     links = [link(name) for name in ("z", "y", "x", "w", "u", "base")]
     joints = [
-        joint("b", "base", "x", "planar"),
+        joint("b", "base", "x", "planar", '<axis xyz="0 0 1"/>'),
         joint("a", "base", "y", "fixed"),
         joint("c", "y", "w", "continuous"),
         joint("B", "base", "z", "prismatic"),

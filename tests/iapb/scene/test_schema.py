@@ -89,7 +89,7 @@ def test_shipped_scenes_keep_to_the_schema(name: str) -> None:
     ("path", "value", "right"),
     [
         (("bodies", 0, "shapes", 0, "size"), [0.1, 0.1], False),
-        (("bodies", 0, "joint"), "planar", False),
+        (("bodies", 0, "joint"), "hinge", False),
         (("dimensions",), 4, False),
         (("bodies", 0, "colour"), "red", False),
         (("bodies",), [], False),

@@ -1,0 +1,385 @@
+"""A robot's joints are what its URDF says, and nothing that the file says is ignored in silence."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from iapb.advice.checks import check_scene
+from iapb.advice.effects import decide_effects
+from iapb.errors import ArgumentError, SceneError
+from iapb.mechanics.mechanism import Mechanism
+from iapb.scene import Scene, scene_from_text
+from iapb.scene.mechanism import mechanism_of, start_of
+from iapb.simulation import simulate
+
+Load = Callable[..., Scene]
+SCENE = """name: robot
+dimensions: 3
+rate: 1000
+duration: {duration}
+gravity: [0, 0, -9.81]
+robots: [{{name: r, urdf: r.urdf{more}}}]
+"""
+
+
+def link(name: str, mass: float = 0.1, inside: str = "") -> str:
+    inertia = " ".join(
+        f'{k}="{1e-2 * mass * (k[1] == k[2])}"' for k in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+    )
+    inertial = f'<inertial><mass value="{mass}"/><inertia {inertia}/></inertial>' if mass else ""
+    return f'<link name="{name}">{inertial}{inside}</link>'
+
+
+def joint(
+    name: str, child: str, kind: str = "prismatic", inside: str = "", parent: str = "palm"
+) -> str:
+    return (
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+        f'<origin xyz="0.1 0 0"/><axis xyz="0 0 1"/>{inside}</joint>'
+    )
+
+
+RANGE = '<limit lower="-0.02" upper="0.04" effort="10" velocity="1"/>'
+PALM, FINGER = link("palm", 1.0), link("finger")
+SLIDE = joint("slide", "finger", inside=RANGE)
+
+
+@pytest.fixture
+def load(tmp_path: Path) -> Load:
+    def load(*elements: str, more: str = "", duration: float = 0.5, bodies: str = "") -> Scene:
+        (tmp_path / "r.urdf").write_text(f'<robot name="r">{"".join(elements)}</robot>')
+        text = SCENE.format(more=more and f", {more}", duration=duration) + bodies
+        return scene_from_text(text, str(tmp_path / "scene.yaml"))
+
+    return load
+
+
+def refusal(load: Load, *elements: str, more: str = "", bodies: str = "") -> str:
+    with pytest.raises(SceneError) as caught:
+        load(*elements, more=more, bodies=bodies)
+    assert len(caught.value.mistakes) == 1  # no second mistake that the first one makes
+    return str(caught.value)
+
+
+# limits
+
+
+def test_a_finger_rests_on_the_limit_of_its_joint(load: Load) -> None:
+    scene = load(PALM, FINGER, SLIDE)
+    assert scene.bodies[1].joint_limits == (-0.02, 0.04)
+    run = simulate(scene)
+    assert run.q.min() == pytest.approx(-0.02, abs=1e-4) and run.q[-1, 0] < -0.0199
+    assert not run.distrust
+
+
+def test_effects_name_the_limits_and_the_damping_of_a_robot(load: Load) -> None:
+    effects = {e.name: e for e in decide_effects(load(PALM, FINGER, SLIDE))}
+    assert effects["joint_limits"].active and "r_finger" in effects["joint_limits"].reason
+    assert not effects["joint_damping"].active
+
+
+def test_a_start_at_rest_outside_the_limits_moves_to_the_nearest_one_and_is_said(
+    load: Load,
+) -> None:
+    scene = load(PALM, FINGER, joint("slide", "finger", inside='<limit lower="0.1" upper="0.3"/>'))
+    assert start_of(scene)[0] == 0.1
+    assert scene.remarks[-1].startswith("robot r: finger starts at 0.1, the limit of joint slide")
+    scene = load(PALM, FINGER, joint("s", "finger", inside='<limit lower="-3" upper="-0.5"/>'))
+    assert start_of(scene)[0] == -0.5
+
+
+@pytest.mark.parametrize("start", [-0.021, 0.05])
+def test_a_given_start_outside_the_limits_is_refused(load: Load, start: float) -> None:
+    said = refusal(load, PALM, FINGER, SLIDE, more=f"position: {{finger: [{start}]}}")
+    assert "link finger" in said and "joint slide" in said and "[-0.02, 0.04]" in said
+
+
+@pytest.mark.parametrize("start", [-0.02, 0.01, 0.04])
+def test_a_given_start_within_the_limits_is_kept_without_a_remark(load: Load, start: float) -> None:
+    scene = load(PALM, FINGER, SLIDE, more=f"position: {{finger: [{start}]}}")
+    assert start_of(scene)[0] == start and not any("starts" in said for said in scene.remarks)
+
+
+@pytest.mark.parametrize(
+    ("limit", "kept"),
+    [
+        ('<limit lower="-1e16" upper="1e16"/>', None),
+        ('<limit lower="-1e16" upper="2"/>', (-1e9, 2.0)),
+        ('<limit lower="0" upper="1e16"/>', (0.0, 1e9)),
+        ("", None),
+    ],
+)
+def test_bounds_that_no_joint_reaches_are_none(
+    load: Load, limit: str, kept: tuple[float, float] | None
+) -> None:
+    scene = load(PALM, FINGER, joint("turn", "finger", "revolute", limit))
+    assert scene.bodies[1].joint_limits == kept
+    assert any("without <limit>" in said and "turn" in said for said in scene.remarks) == (
+        not limit
+    )
+
+
+@pytest.mark.parametrize(
+    "limit", ['<limit effort="1" velocity="2"/>', '<limit lower="1" upper="1"/>']
+)
+def test_a_range_of_one_point_is_refused_and_can_be_left_out(load: Load, limit: str) -> None:
+    turn = joint("turn", "finger", "revolute", limit)
+    assert "leave_out: {turn: [limit]}" in refusal(load, PALM, FINGER, turn)
+    scene = load(PALM, FINGER, turn, more="leave_out: {turn: [limit]}")
+    assert scene.bodies[1].joint_limits is None
+
+
+@pytest.mark.parametrize(
+    ("inside", "named"),
+    [
+        ('<limit lower="1" upper="-1"/>', "lower <= upper"),
+        ('<limit lower="a" upper="1"/>', "'slide'> limit lower"),
+        ('<limit lowr="-1" upper="1"/>', "did you mean lower"),
+        ('<limt lower="-1" upper="1"/>', "misspelt"),
+        ('<dynamics damping="-1"/>', "dynamics damping"),
+        ('<dynamics friction="-1"/>', "dynamics friction"),
+        ('<dynamics dampng="1"/>', "did you mean damping"),
+    ],
+)
+def test_a_wrong_limit_or_damping_is_refused_by_name(load: Load, inside: str, named: str) -> None:
+    assert named in refusal(load, PALM, FINGER, joint("slide", "finger", inside=inside))
+
+
+def test_the_limits_of_a_continuous_or_fixed_joint_are_remarked_and_ignored(load: Load) -> None:
+    scene = load(
+        PALM, FINGER, link("cap"), joint("turn", "finger", "continuous", RANGE),
+        joint("weld", "cap", "fixed", RANGE + '<dynamics damping="1"/>'),
+    )  # fmt: skip
+    assert [body.joint_limits for body in scene.bodies] == [None] * 3
+    (said,) = scene.remarks
+    for what in ("of continuous joints (1)", "<limit> of fixed joints (1)", "<dynamics> of fixed"):
+        assert what in said
+
+
+# damping
+
+
+def test_damping_is_that_of_the_same_scene_in_yaml(load: Load) -> None:
+    """Terminal speed m g / d; the run has the bits of a scene that says joint_damping itself."""
+    scene = load(PALM, FINGER, joint("slide", "finger", inside='<dynamics damping="5"/>'))
+    plain = load(PALM, FINGER, joint("slide", "finger")).with_values(
+        {"bodies.r_finger.joint_damping": 5.0}
+    )
+    run = simulate(scene)
+    assert (run.q[-1, 0] - run.q[-2, 0]) / run.dt == pytest.approx(-0.1 * 9.81 / 5.0, rel=1e-9)
+    assert np.array_equal(run.q, simulate(plain).q)
+
+
+# what is ignored is said, once
+
+
+def test_one_remark_counts_what_has_no_effect(load: Load) -> None:
+    shapes = "<visual><geometry><box/></geometry></visual><collision/><collision/>"
+    scene = load(
+        PALM, link("finger", inside=shapes),
+        SLIDE.replace('<axis xyz="0 0 1"/>', '<axis xyz="0 0 1" rpy="0 0 0"/>'),
+        '<transmission name="t"/><gazebo/><gazebo reference="palm"/>',
+    )  # fmt: skip
+    (said,) = scene.remarks
+    for what in (
+        "effort of <limit> (1)", "velocity of <limit> (1)", "<visual> (1)", "<collision> (2)",
+        "rpy of <axis> (1)", "<transmission> (1)", "<gazebo> (2)", "the scene gives shapes",
+    ):  # fmt: skip
+        assert said.count(what) == 1
+    assert simulate(scene, steps=1).remarks[0] == said
+    assert scene.with_values({"rate": 500}).remarks == scene.remarks
+
+
+def test_a_plain_robot_is_read_without_a_remark(load: Load) -> None:
+    inside = '<limit lower="-1" upper="1"/><dynamics damping="1"/>'
+    assert load(PALM, FINGER, joint("s", "finger", inside=inside)).remarks == ()
+
+
+# what cannot be simulated is refused, and can be left out
+
+
+def test_an_unknown_joint_type_is_refused_and_can_be_left_out_with_what_it_carries(
+    load: Load,
+) -> None:
+    screw = joint("bolt", "nut", "screw"), joint("tip", "end", "fixed", parent="nut")
+    parts = PALM, FINGER, link("nut"), link("end"), SLIDE, *screw
+    assert "leave_out: {bolt: [joint]}" in refusal(load, *parts)
+    scene = load(*parts, more="leave_out: {bolt: [joint]}")
+    assert [body.name for body in scene.bodies] == ["r_palm", "r_finger"]
+
+
+def test_a_loop_is_refused_and_can_be_cut(load: Load) -> None:
+    parts = PALM, FINGER, link("rod"), SLIDE, joint("a", "rod"), joint("b", "rod", parent="finger")
+    assert "leave_out: {b: [joint]}" in refusal(load, *parts)
+    scene = load(*parts, more="leave_out: {b: [joint]}")
+    assert [body.parent for body in scene.bodies] == ["world", "r_palm", "r_palm"]
+    scene = load(*parts, more="leave_out: {a: [joint]}")
+    assert [body.parent for body in scene.bodies] == ["world", "r_palm", "r_finger"]
+
+
+@pytest.mark.parametrize(
+    "inside",
+    ['<limit lower="-1" upper="1"/>', '<dynamics damping="1"/>', '<dynamics friction="1"/>'],
+)
+@pytest.mark.parametrize("kind", ["planar", "floating"])
+def test_limits_and_damping_of_planar_and_floating_joints_are_refused(
+    load: Load, kind: str, inside: str
+) -> None:
+    assert "leave_out: {move: [" in refusal(
+        load, PALM, FINGER, joint("move", "finger", kind, inside)
+    )
+
+
+def test_left_out_damping_is_none(load: Load) -> None:
+    slide = joint("slide", "finger", inside='<dynamics damping="5"/>')
+    scene = load(PALM, FINGER, slide, more="leave_out: {slide: [dynamics]}")
+    assert scene.bodies[1].joint_damping == ()
+    assert "a joint of it: slide" in refusal(
+        load, PALM, FINGER, slide, more="leave_out: {x: [limit]}"
+    )
+
+
+# a refused robot makes no second mistake
+
+
+@pytest.mark.parametrize(
+    "bodies",
+    [
+        "hand: {body: r_finger}",
+        "bodies: [{name: stand, joint: fixed}]",
+        "bodies: [{name: tool, parent: r_finger, joint: fixed}]",
+        "hand: {body: r_finger}\ndevice: {force_limit: [1]}\n"
+        "couplings: {unilateral: {stiffness: [1], damping: [1]}}",
+    ],
+)
+def test_a_refused_robot_is_the_only_mistake(load: Load, bodies: str) -> None:
+    assert "screw" in refusal(load, PALM, FINGER, joint("s", "finger", "screw"), bodies=bodies)
+
+
+def test_a_real_second_mistake_is_still_told(load: Load) -> None:
+    with pytest.raises(SceneError) as caught:
+        load(PALM, FINGER, joint("s", "finger", "screw"), bodies="contact: {friction: -1}")
+    assert len(caught.value.mistakes) == 2
+
+
+def test_a_mistake_of_a_robots_body_names_robot_link_and_joint(load: Load) -> None:
+    said = refusal(load, PALM, link("finger", 1e10), SLIDE)
+    assert "robots[0]: mass of link 'finger', joint 'slide'" in said
+    assert "bodies[" not in said and "default" not in said
+
+
+# joints that move no mass
+
+YAML = """name: chain
+dimensions: 3
+rate: 1000
+duration: 0.01
+bodies:
+"""
+SOLID = "mass: 1, inertia: [0.1, 0.2, 0.2]"
+MOVED = {
+    "a massless slide that carries a body": [
+        "{name: a, joint: prismatic, axis: [1, 0, 0]}",
+        f"{{name: b, parent: a, joint: prismatic, axis: [0, 1, 0], {SOLID}}}",
+    ],
+    "a massless universal joint": [
+        "{name: a, joint: revolute, axis: [1, 0, 0]}",
+        f"{{name: b, parent: a, joint: revolute, axis: [0, 1, 0], {SOLID}}}",
+    ],
+    "a massless free base": [
+        "{name: a, joint: free_flyer}",
+        f"{{name: b, parent: a, joint: fixed, origin: [0, 0, 1], {SOLID}}}",
+    ],
+    "a point on an arm": [
+        "{name: a, joint: revolute, axis: [0, 0, 1], mass: 1, center_of_mass: [1, 0, 0]}"
+    ],
+    "a massless plane": [
+        "{name: a, joint: planar}",
+        f"{{name: b, parent: a, joint: revolute, axis: [1, 0, 0], {SOLID}}}",
+    ],
+}
+NOT_MOVED = {
+    "finger: no mass turns about it": [
+        f"{{name: arm, joint: revolute, axis: [0, 0, 1], {SOLID}}}",
+        "{name: finger, parent: arm, joint: revolute, axis: [0, 1, 0]}",
+    ],
+    "finger: no mass moves along it": [
+        f"{{name: arm, joint: revolute, axis: [0, 0, 1], {SOLID}}}",
+        "{name: finger, parent: arm, joint: prismatic, axis: [0, 1, 0], inertia: [1, 1, 1]}",
+    ],
+    "b: no mass lies between it": [
+        "{name: a, joint: prismatic, axis: [1, 0, 0]}",
+        f"{{name: b, parent: a, joint: prismatic, axis: [1, 0, 0], {SOLID}}}",
+    ],
+    "tip: no mass turns about it": [
+        "{name: tip, joint: revolute, axis: [1, 0, 0], mass: 1, center_of_mass: [1, 0, 0]}"
+    ],
+    "ball: no mass turns about it": ["{name: ball, joint: free_flyer, mass: 1}"],
+    "disc: no mass turns about it": ["{name: disc, joint: planar, mass: 1}"],
+}
+
+
+@pytest.mark.parametrize("bodies", MOVED.values(), ids=MOVED)
+def test_a_massless_body_loads_where_its_joint_moves_mass(bodies: list[str]) -> None:
+    scene = scene_from_text(YAML + "".join(f"  - {body}\n" for body in bodies))
+    values = np.linalg.eigvalsh(mechanism_of(scene).mass_matrix(start_of(scene)[0]))
+    assert values[0] > 0.0
+    assert simulate(scene).complete
+
+
+@pytest.mark.parametrize(("said", "bodies"), NOT_MOVED.items(), ids=NOT_MOVED)
+def test_a_joint_that_moves_no_mass_is_named(said: str, bodies: list[str]) -> None:
+    text = YAML + "".join(f"  - {body}\n" for body in bodies)
+    with pytest.raises(SceneError) as caught:
+        scene_from_text(text, "wrong.yaml")
+    (mistake,) = caught.value.mistakes
+    name = said.split(":")[0]
+    assert mistake.path == f"joint of {name}" and said in mistake.expected
+    assert mistake.line == 5 + len(bodies) and "default" not in mistake.value
+
+
+@pytest.mark.parametrize("use", [simulate, check_scene])
+def test_a_mass_that_is_taken_away_later_is_named_too(use: Callable[[Scene], object]) -> None:
+    bodies = f"  - {{name: arm, joint: revolute, axis: [0, 0, 1], {SOLID}}}\n"
+    scene = scene_from_text(YAML + bodies)
+    with pytest.raises(ArgumentError, match="joint of arm.*no mass turns about it"):
+        use(scene.with_values({"bodies.arm.mass": 0.0, "bodies.arm.inertia": [0.0, 0.0, 0.0]}))
+
+
+def test_a_massless_link_of_a_robot_is_named_with_its_joint(load: Load) -> None:
+    said = refusal(load, PALM, link("finger", 0.0), SLIDE)
+    assert "link 'finger', joint 'slide'" in said and "no mass moves along it" in said
+    assert "bodies[" not in said and "default" not in said
+    tool = f"bodies: [{{name: box, joint: free_flyer, {SOLID}}}]"
+    assert "bodies[" not in refusal(load, PALM, link("finger", 0.0), SLIDE, bodies=tool)
+
+
+# planar joints
+
+
+@pytest.mark.parametrize("axis", ["0 0 1", "1 0 0", "0 2 0", "1 2 -2"])
+def test_a_planar_joint_moves_across_its_axis(load: Load, axis: str) -> None:
+    slide = joint("move", "finger", "planar").replace('"0 0 1"', f'"{axis}"')
+    scene = load(PALM, FINGER, slide, more="position: {finger: [0.3, 0.2, 0.5]}")
+    mechanism, normal = mechanism_of(scene), np.array(axis.split(), float)
+    R, p = mechanism.placements(start_of(scene)[0])
+    moved = p[-1] - [0.1, 0.0, 0.0]
+    assert np.linalg.norm(moved) == pytest.approx(np.hypot(0.3, 0.2))
+    assert moved @ normal == pytest.approx(0.0, abs=1e-15)
+    np.testing.assert_allclose(R[-1] @ normal, normal, atol=1e-14)
+    assert np.trace(R[-1]) == pytest.approx(1.0 + 2.0 * np.cos(0.5))
+    R, p = mechanism.placements(mechanism.neutral())
+    np.testing.assert_allclose(R[-1], np.eye(3), atol=1e-15)
+
+
+def test_a_planar_joint_has_pinocchios_mass_matrix(load: Load, tmp_path: Path) -> None:
+    pin = pytest.importorskip("pinocchio")
+    load(PALM, FINGER, joint("move", "finger", "planar"))
+    model = pin.buildModelFromUrdf(str(tmp_path / "r.urdf"))
+    mine = Mechanism.from_urdf(tmp_path / "r.urdf")
+    theirs = pin.crba(model, model.createData(), pin.neutral(model))
+    np.testing.assert_allclose(mine.mass_matrix(mine.neutral()), theirs, atol=1e-15)
