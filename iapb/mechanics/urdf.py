@@ -248,17 +248,14 @@ class _Joints:
 
     def _limits(self, element: ElementTree.Element) -> tuple[float, float] | None:
         limit, kind, name = element.find("limit"), element.get("type"), str(element.get("name"))
+        if kind not in WITH_RANGE:
+            self.ignored[f"<limit> of {kind} joints"] += limit is not None
+            return None
         if limit is None:
-            self.unlimited += [name] * (kind in WITH_RANGE)
+            self.unlimited.append(name)
             return None
         where = f"{where_of(element)} limit"
         lower, upper = (_number(where, limit, bound, "0") for bound in ("lower", "upper"))
-        if kind not in WITH_RANGE:
-            given = "lower" in limit.attrib or "upper" in limit.attrib
-            if given and kind in ("planar", "floating"):
-                raise ArgumentError(where, kind, f"no range; {_leaving(name, 'limit')}")
-            self.ignored[f"<limit> of {kind} joints"] += given
-            return None
         if lower > upper:
             raise ArgumentError(where, [lower, upper], "lower <= upper")
         self.empty += [name] * (lower == upper)
