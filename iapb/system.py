@@ -62,7 +62,7 @@ class System:
     restitutions : (r,) the distinct values of e among the pairs of shapes that can touch, ascending
     frictions : Frictions, of all pairs of shapes
     start : (q, v)
-    joint_damping : (d,) [N s/m, N m s/rad]; stops : Stops, the limits of the joints
+    joint_damping, joint_friction : (d,) [N s/m, N m s/rad] and [N, N m]; stops : Stops, the limits of the joints
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -75,10 +75,9 @@ class System:
         self.pairs = scene_parts.pairs_of(scene, self.shapes)
         self.stops = scene_parts.stops_of(scene, self.mechanism)
         self.capacity = contact_capacity(self.shapes, self.pairs) + len(self.stops.bound)
-        self.joint_damping, self.start = (
-            scene_parts.joint_damping_of(scene),
-            scene_parts.start_of(scene),
-        )
+        self.joint_damping = scene_parts.joint_damping_of(scene)
+        self.joint_friction = scene_parts.joint_friction_of(scene)
+        self.start = scene_parts.start_of(scene)
         self.restitutions = scene_parts.restitutions_of(scene, self.pairs)
         self.frictions = scene_parts.frictions_of(scene)
         self.dt = 1.0 / scene.rate
@@ -88,7 +87,7 @@ class System:
         if scene.hand is not None:
             trees = self.mechanism.tree_of_body
             self.tool_tree = int(trees[self.mechanism.index(scene.hand.body)])
-            start = int(self.mechanism.arrays.q_start[np.argmax(trees == self.tool_tree)])
+            start = int(self.mechanism.arrays.q_start[trees == self.tool_tree].min())
             self.tool_dofs = self.mechanism.tree_dofs[self.tool_tree]
             self.tool_coordinates = start, start + self.device_mechanism().nq
         self._worlds: dict[Any, World] = {}
@@ -180,6 +179,7 @@ class System:
                 own_restitution=scene_parts.restitution_by_shape(scene),
                 per_body_rows=contact.self_collision_rows == "per_body",
                 joint_damping=self.joint_damping,
+                joint_friction=self.joint_friction,
                 stops=self.stops,
                 impulse_limit=limit,
                 conserving=law.integrator == "momentum",
@@ -212,7 +212,7 @@ class System:
         sliding = (
             scene.largest_friction > 0.0 and not per_body
         )  # per-body rows have no slip: no friction in impacts
-        soft = contact.forces == "implicit"
+        soft = contact.forces == "implicit" or bool(self.joint_friction.any())
         log = blank(quantities(ImpactTable)[1:], {"impact": trees, "velocity": d})
         for name, value in {
             "scale": 1,
@@ -227,7 +227,7 @@ class System:
                 quantities(State),
                 {"coordinate": mechanism.nq, "velocity": d, "tree": trees, "row": rows},
             ),
-            body=make_workspace(len(mechanism.bodies), d),
+            body=make_workspace(len(mechanism.bodies), mechanism.motions),
             contacts=zeros_of(ContactBuffer, contact=c),
             previous=zeros_of(ContactBuffer, contact=c),
             scratch_contacts=zeros_of(ContactBuffer, contact=c),
@@ -252,7 +252,7 @@ class System:
         )
         state.q[:], state.v[:] = self.start
         state.mass_matrix[:] = mechanism.mass_matrix(state.q)
-        scene_parts.require_moved(scene)
+        scene_parts.require_joints(scene)
         _factored(state.mass_matrix, state.lower)
         state.group_of_tree[:] = state.island_of_tree[:] = np.arange(trees)
         state.located_q[:] = np.nan
@@ -298,7 +298,7 @@ class System:
             hand_body=-1 if hand is None else self.mechanism.index(hand.body),
             device_body=-1 if hand is None else device.index(hand.body),
             mechanism=device.block,
-            body=make_workspace(len(device.bodies), device.nv),
+            body=make_workspace(len(device.bodies), device.motions),
             varying_inertia=not device.has_constant_mass_matrix,
             quantised="quantisation" in on,
             free=make_free_motion(device.arrays, device.tree_of_body),

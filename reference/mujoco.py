@@ -38,7 +38,7 @@ from iapb.engines import fields_of_our_engine, run_of_states
 from iapb.errors import IapbError
 from iapb.lazy import needed
 from iapb.mechanics.bodies import Body
-from iapb.mechanics.joints import KINDS
+from iapb.mechanics.joints import KINDS, Mimic
 from iapb.run import INTERRUPTED, Run
 from iapb.scene import Scene
 from iapb.scene import mechanism as scene_parts
@@ -62,6 +62,8 @@ class JointPlace(NamedTuple):
     v: int
     qpos: int
     qvel: int
+    ratio: float = 0.0  # of a joint that follows another one
+    offset: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -172,6 +174,8 @@ class MuJoCo:
             made[body.name] = _add_body(made[body.parent], body, flat)
             if given.joint_limits is not None:
                 self._limit(made[body.name].joints[0], given.joint_limits, scene)
+            if given.joint_mimic is not None:
+                _follow(spec, made, body)
         shapes = scene_parts.shapes_of(scene)
         for i, owner in enumerate(shapes.body):
             carrier = spec.worldbody if owner < 0 else made[scene.bodies[owner].name]
@@ -181,6 +185,8 @@ class MuJoCo:
         for place, given in zip(joint_places(scene, model), scene.bodies, strict=True):
             damping = given.joint_damping
             model.dof_damping[place.qvel : place.qvel + len(damping)] = damping
+            friction = given.joint_friction
+            model.dof_frictionloss[place.qvel : place.qvel + len(friction)] = friction
         return model
 
     def solref(self, restitution: float, step: float) -> tuple[float, float]:
@@ -282,6 +288,21 @@ def _add_body(parent: Any, body: Body, flat: bool) -> Any:
     return made
 
 
+def _follow(spec: Any, made: dict[str | None, Any], body: Body) -> None:
+    """Let a joint follow another one; it starts where the other one says."""
+    mimic = body.mimic or Mimic("")
+    follower, leader = made[body.name].joints[0], made[mimic.body].joints[0]
+    follower.name, leader.name = f"{body.name} joint", f"{mimic.body} joint"
+    spec.add_equality(
+        type=_mujoco().mjtEq.mjEQ_JOINT,
+        name1=follower.name,
+        name2=leader.name,
+        data=[mimic.offset, mimic.multiplier, *[0.0] * 9],
+        solref=[2.0 * spec.option.timestep, 1.0],
+        solimp=HARD,
+    )
+
+
 def _add_geom(spec: Any, carrier: Any, shapes: Shapes, i: int) -> None:
     """Add shape number i to a body of the model; only the listed pairs touch."""
     kinds = _mujoco().mjtGeom
@@ -345,13 +366,25 @@ def joint_places(scene: Scene, model: Any) -> list[JointPlace]:
     for body, q, v in zip(scene.bodies, arrays.q_start, arrays.v_start, strict=True):
         joint = int(model.body(body.name).jntadr[0])
         qpos, qvel = (model.jnt_qposadr[joint], model.jnt_dofadr[joint]) if joint >= 0 else (0, 0)
-        found.append(JointPlace(body.joint, int(q), int(v), int(qpos), int(qvel)))
+        place = JointPlace(body.joint, int(q), int(v), int(qpos), int(qvel))
+        if body.joint_mimic is not None:
+            place = place._replace(
+                kind="follows",
+                v=int(arrays.dof_leader[v]),
+                ratio=body.joint_mimic.multiplier,
+                offset=body.joint_mimic.offset,
+            )
+        found.append(place)
     return found
 
 
 def set_state(places: list[JointPlace], data: Any, q: Floats, v: Floats) -> None:
     """Write a configuration and a velocity of the scene into MuJoCo's state."""
     for place in places:
+        if place.kind == "follows":
+            data.qpos[place.qpos] = place.ratio * q[place.q] + place.offset
+            data.qvel[place.qvel] = place.ratio * v[place.v]
+            continue
         kind = KINDS[place.kind]
         coordinates = q[place.q : place.q + kind.nq]
         velocities = v[place.v : place.v + kind.nv]
@@ -372,6 +405,8 @@ def states_of(places: list[JointPlace], qpos: Floats, qvel: Floats) -> tuple[Flo
     """Return configurations (n, nq) and velocities (n, d) of the scene from MuJoCo's (n, ...)."""
     q, v = [np.zeros((len(qpos), 0))], []
     for place in places:
+        if place.kind == "follows":
+            continue
         kind = KINDS[place.kind]
         velocities = qvel[:, place.qvel : place.qvel + kind.nv]
         if place.kind == "continuous":

@@ -168,6 +168,75 @@ class PinocchioMechanism:
         return self._places[body]
 
 
+class Following(PinocchioMechanism):
+    """A Pinocchio model some of whose joints follow others: its coordinates are A q + b, its
+    velocities G v.
+
+    Pinocchio's own mimic joints lack energies, momentum and the articulated body algorithm.
+
+    Parameters
+    ----------
+    model : as if all joints moved by themselves
+    followers : list of (joint, leader, multiplier, offset)
+        Numbers of joints with one coordinate in the model.
+    """
+
+    def __init__(self, model: Any, followers: list[tuple[int, int, float, float]]) -> None:
+        super().__init__(model)
+        self.full = PinocchioMechanism(model)
+        at = [(model.joints[i], model.joints[k], *rest) for i, k, *rest in followers]
+        self._q = np.delete(np.arange(model.nq), [one.idx_q for one, *_ in at])
+        self._v = np.delete(np.arange(model.nv), [one.idx_v for one, *_ in at])
+        self._spread_q, self._spread = np.eye(model.nq), np.eye(model.nv)
+        self._offset = np.zeros(model.nq)
+        for one, leader, multiplier, offset in at:
+            self._spread_q[one.idx_q, leader.idx_q] = multiplier
+            self._spread[one.idx_v, leader.idx_v] = multiplier
+            self._offset[one.idx_q] = offset
+        self._spread_q, self._spread = self._spread_q[:, self._q], self._spread[:, self._v]
+        self.nq, self.nv = len(self._q), len(self._v)
+
+    def _at(self, q: Floats) -> Floats:
+        return np.asarray(self._spread_q @ q + self._offset)
+
+    def _rates(self, v: Floats) -> Floats:
+        return np.asarray(self._spread @ v)
+
+    def mass_matrix(self, q: Floats) -> Floats:
+        return np.asarray(self._spread.T @ self.full.mass_matrix(self._at(q)) @ self._spread)
+
+    def inverse_dynamics(self, q: Floats, v: Floats, dv: Floats, g: ArrayLike) -> Floats:
+        forces = self.full.inverse_dynamics(self._at(q), self._rates(v), self._rates(dv), g)
+        return np.asarray(self._spread.T @ forces)
+
+    def bodies(self, q: Floats) -> tuple[Floats, Floats, Floats]:
+        axes, origins, rows = self.full.bodies(self._at(q))
+        return axes, origins, rows @ self._spread
+
+    def kinetic_energy(self, q: Floats, v: Floats) -> float:
+        return self.full.kinetic_energy(self._at(q), self._rates(v))
+
+    def potential_energy(self, q: Floats, g: ArrayLike) -> float:
+        return self.full.potential_energy(self._at(q), g)
+
+    def centroidal_momentum(self, q: Floats, v: Floats) -> Floats:
+        return self.full.centroidal_momentum(self._at(q), self._rates(v))
+
+    def integrate(self, q: Floats, v: Floats, dt: float) -> Floats:
+        return self.full.integrate(self._at(q), self._rates(v), dt)[self._q]
+
+    def normalize(self, q: Floats) -> Floats:
+        return self.full.normalize(self._at(q))[self._q]
+
+    def rate(self, q: Floats, v: Floats) -> Floats:
+        return self.full.rate(self._at(q), self._rates(v))[self._q]
+
+    def free_acceleration(self, q: Floats, v: Floats) -> Floats:
+        return np.asarray(np.linalg.solve(self.mass_matrix(q), -self.bias(q, v)))
+
+    has_bias = True
+
+
 def at_lever(jacobian: Floats, lever: Floats) -> Floats:
     """Return J (3, d) of a point from the Jacobian (6, d) of its body and its distance (3,) from
     the body's origin."""
@@ -201,8 +270,16 @@ def _rates(layout, q, v):  # type: ignore[no-untyped-def]
 
 def model_from_urdf(path: str | Path, floating_base: bool = False) -> PinocchioMechanism:
     """Read a URDF file by Pinocchio's own parser."""
-    root = (_pinocchio().JointModelFreeFlyer(),) if floating_base else ()
-    return PinocchioMechanism(_pinocchio().buildModelFromUrdf(str(path), *root))
+    pinocchio = _pinocchio()
+    root = (pinocchio.JointModelFreeFlyer(),) if floating_base else ()
+    model = pinocchio.buildModelFromUrdf(str(path), *root)
+    read, followers = pinocchio.buildModelFromUrdf(str(path), *root, mimic=True), []
+    leaders = {joint.idx_q: i for i, joint in enumerate(read.joints) if joint.nq}
+    for i, joint in enumerate(read.joints):
+        if joint.shortname() == "JointModelMimic":
+            follows = joint.extract()
+            followers.append((i, leaders[joint.idx_q], follows.scaling, follows.offset))
+    return Following(model, followers) if followers else PinocchioMechanism(model)
 
 
 def model_of(mechanism: Mechanism) -> PinocchioMechanism:
@@ -244,7 +321,17 @@ def model_of(mechanism: Mechanism) -> PinocchioMechanism:
         inertia = pinocchio.Inertia(body.mass, body.center_of_mass, body.inertia)
         model.appendBodyToJoint(joint, inertia, placement)
         model.addBodyFrame(body.name, joint, placement, 0)
-    return PinocchioMechanism(model)
+    followers = [
+        (
+            model.getJointId(f"{body.name} joint 0"),
+            model.getJointId(f"{body.mimic.body} joint 0"),
+            body.mimic.multiplier,
+            body.mimic.offset,
+        )
+        for body in mechanism.bodies
+        if body.mimic is not None
+    ]
+    return Following(model, followers) if followers else PinocchioMechanism(model)
 
 
 # Pinocchio's joints that form each joint.

@@ -83,7 +83,7 @@ class Start:
     """
 
     def __init__(self, scene: Scene) -> None:
-        mechanism.require_moved(scene)
+        mechanism.require_joints(scene)
         self.scene, self.dt, self.spatial = scene, 1.0 / scene.rate, isinstance(scene, SpatialScene)
         self.mechanism, (self.q, self.v) = mechanism.mechanism_of(scene), mechanism.start_of(scene)
         self.shapes = mechanism.shapes_of(scene)
@@ -97,13 +97,14 @@ class Start:
         ]
         solids, trees = solids_of(self.shapes), self.mechanism.tree_of_body
         size = [solids[i].thin if i in solids else math.inf for i in range(len(self.labels))]
+        ranges = mechanism.limits_of(scene)
         for b, sign, arm in zip(
             self.stops.body.tolist(), self.stops.sign, self.stops.arm.tolist(), strict=True
         ):
             self.labels.append(
                 f"the {'lower' if sign > 0.0 else 'upper'} limit of {scene.bodies[b].name}"
             )
-            size.append(arm * float(np.ptp(scene.bodies[b].joint_limits or (0.0,))))
+            size.append(arm * float(np.ptp(ranges[b] or (0.0,))))
         none = np.full(len(self.stops.body), -1)
         self.kind, self.radius = (
             np.append(self.shapes.kind, none),

@@ -20,7 +20,7 @@ from iapb.mechanics.rotations import rotation_of
 from iapb.names import in_metres
 from iapb.run import UNSOLVED, Run
 from iapb.scene.bodies import WORLD, inertia_matrix
-from iapb.scene.mechanism import mechanism_of, pairs_of, shapes_of
+from iapb.scene.mechanism import limits_of, mechanism_of, pairs_of, shapes_of
 from iapb.scene.model import scene_kind
 from iapb.schema import Booleans, Floats, Integers
 
@@ -162,7 +162,7 @@ def _books(seen: _Seen) -> Iterator[_Book]:
         alone, dofs, q = (
             mechanism.alone(t),
             slice(*ranges[t]),
-            int(mechanism.arrays.q_start[roots[t]]),
+            int(mechanism.arrays.q_start[trees == t].min()),
         )
         forces = {name: getattr(run, f"{name}_force")[begin:, dofs] for name in FORCES}
         states = run.q[begin:, q : q + alone.nq], run.v[begin:, dofs]
@@ -226,11 +226,12 @@ def _spun(seen: _Seen) -> Iterator[str]:
     run, begin, start, parents = seen.run, seen.begin, 0, {body.parent for body in seen.bodies}
     forces = [run.impulse, *(getattr(run, f"{name}_force") for name in FORCES)]
     for b, body in enumerate(seen.bodies):
-        dofs = slice(start, start := start + KINDS[body.joint].nv)
+        count = 0 if body.joint_mimic else KINDS[body.joint].nv
+        dofs = slice(start, start := start + count)
         free = (
             body.joint in ("planar", "free_flyer")
             and body.parent == WORLD
-            and not any(body.joint_damping)
+            and not any((*body.joint_damping, *body.joint_friction))
         )
         if (
             not free
@@ -420,10 +421,7 @@ def _overran(seen: _Seen) -> Iterator[str]:
     """Say which joint goes beyond a limit by more than half of its range, or by more than OVERRUN
     at the end."""
     run, most = seen.run, OVERRUN[seen.scene.contact.forces]
-    limited = [
-        (i, body.joint_limits)
-        for i, body in zip(seen.mechanism.arrays.q_start, seen.bodies, strict=True)
-    ]
+    limited = zip(seen.mechanism.arrays.q_start, limits_of(seen.scene), strict=True)
     for i, (low, high) in ((i, limits) for i, limits in limited if limits):
         beyond = np.maximum(low - run.q[:, i], run.q[:, i] - high) / (high - low)
         k = len(beyond) - 1 if beyond[-1] > most else int(beyond.argmax())

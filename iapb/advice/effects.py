@@ -91,7 +91,8 @@ class Question:
         for _ in range(_POSES if any(field) else 0):
             felt |= mechanism.gravity(q, [*field, 0.0][:3]) != 0.0
             q = mechanism.integrate(q, chance.uniform(-1.0, 1.0, mechanism.nv), 1.0)
-        return [mechanism.names[b] for b in dict.fromkeys(mechanism.arrays.dof_body[felt].tolist())]
+        felt_by = mechanism.arrays.dof_body[: mechanism.nv][felt]
+        return [mechanism.names[b] for b in dict.fromkeys(felt_by.tolist())]
 
     @property
     def turning(self) -> str:
@@ -203,7 +204,7 @@ def _push(q: Question) -> str:
     return f"the hand pushes {hand.body}: {' + '.join(said)}"
 
 
-def _joints(what: str, unit: str, left_out: str) -> Rule:
+def _joints(what: str, unit: str, left_out: str, part: str = laws.JOINTS) -> Rule:
     """Return the rule of an effect that joints ask for by a field."""
     field = f"joint_{what}"
 
@@ -218,7 +219,7 @@ def _joints(what: str, unit: str, left_out: str) -> Rule:
     return Rule(
         lambda q: f"{field}: {', '.join(given(q)[:3])}{' …' if len(given(q)) > 3 else ''} {unit}",
         left_out,
-        parts=(laws.JOINTS,),
+        parts=(part,),
         absent=lambda q: "" if given(q) else f"no joint has {what}",
         ignores=field,
     )
@@ -306,10 +307,16 @@ EFFECTS: dict[str, Rule] = {
         lambda q: "" if _push(q) else "the hand holds still: hand.force is zero",
         absent=lambda q: "" if q.scene.hand else "the scene has no hand",
     ),
-    # joints: viscous damping, integrated implicitly, and limits, which act as contacts of a link
+    # joints: viscous damping and dry friction, integrated implicitly, and limits, which act as contacts of a link
     # with its parent
     "joint_damping": _joints(
         "damping", "N s/m, N m s/rad", "joints would turn and slide without loss"
+    ),
+    "joint_friction": _joints(
+        "friction",
+        "N, N m",
+        "joints would turn and slide without dry friction",
+        laws.JOINT_FRICTION,
     ),
     "joint_limits": _joints("limits", "rad, m", "joints would turn and slide without end"),
     # what can touch
@@ -529,7 +536,7 @@ def decide_for(
         rendering = getattr(law, "rendering", "full") if rendering is None else rendering
     known = laws.ENGINE_LAWS.get(law) if isinstance(law, str) else law
     uses = (
-        laws.EVERYTHING | {laws.JOINTS}
+        laws.EVERYTHING | {laws.JOINTS, laws.JOINT_FRICTION}
         if known is None
         else getattr(known, "uses", laws.EVERYTHING)
     )

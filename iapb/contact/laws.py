@@ -31,6 +31,7 @@ PENALTY, IMPULSES, FRICTION, CLUSTERS, NEWNESS = (
     "newness",
 )
 IMPACT_FRICTION, OWN_RESTITUTION = "impact friction", "own restitution"
+JOINT_FRICTION = "joint friction"
 JOINTS = "joints"  # damping and limits of joints: a law that does not name this part ignores them
 EVERYTHING = frozenset(
     {PENALTY, IMPULSES, FRICTION, CLUSTERS, NEWNESS, IMPACT_FRICTION, OWN_RESTITUTION}
@@ -194,9 +195,8 @@ class ImpulseAugmented(_EngineLaw):
     @property
     def uses(self) -> frozenset[str]:
         """Parts of the scene that the law uses."""
-        return (EVERYTHING if self.friction_in_impacts else EVERYTHING - {IMPACT_FRICTION}) | {
-            JOINTS
-        }
+        parts = EVERYTHING | {JOINTS, JOINT_FRICTION}
+        return parts if self.friction_in_impacts else parts - {IMPACT_FRICTION}
 
 
 @dataclass(frozen=True)
@@ -208,7 +208,7 @@ class Penalty(_EngineLaw):
     friction_in_impacts = pushing = False
     rendering = "full"
     uses = frozenset(
-        {PENALTY, FRICTION, CLUSTERS, NEWNESS, JOINTS}
+        {PENALTY, FRICTION, CLUSTERS, NEWNESS, JOINTS, JOINT_FRICTION}
     )  # the record says which contacts are new
 
 

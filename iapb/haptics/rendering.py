@@ -10,7 +10,13 @@ from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.step import LARGEST_SPEED
 from iapb.linalg import add, cholesky, dot, load, solve_mass, transform
 from iapb.mechanics.kernels.arrays import MechanismArrays, Workspace
-from iapb.mechanics.kernels.configuration import difference, integrate, integrate_body, is_vector
+from iapb.mechanics.kernels.configuration import (
+    difference,
+    integrate,
+    integrate_body,
+    is_vector,
+    own_count,
+)
 from iapb.mechanics.kernels.dynamics import bias, mass_matrix
 from iapb.mechanics.kernels.free_motion import RIGID, FreeMotion, move_simple_trees
 from iapb.mechanics.kernels.kinematics import add_point_force, forward_kinematics
@@ -114,7 +120,7 @@ def sense(world, port, velocity):
     difference(m, port.sensed_q, port.device_q, port.error)
     for b in range(m.kind.shape[0]):
         i, k, vector = m.q_start[b], m.v_start[b], is_vector(m.kind[b])
-        for j in range(m.v_count[b]):
+        for j in range(own_count(m, b)):
             step = port.resolution[k + j]
             exact, moved = step == 0.0, port.error[k + j]
             if vector:
@@ -172,7 +178,7 @@ def press(mechanism, body, held, port, out):
     k = mechanism.last_dof[held]
     while k >= 0:
         if mechanism.dof_rotates[k]:
-            out[k] += dot(load(body.axis, k), torque)
+            out[mechanism.dof_leader[k]] += mechanism.dof_ratio[k] * dot(load(body.axis, k), torque)
         k = mechanism.dof_parent[k]
 
 

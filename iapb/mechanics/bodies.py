@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from iapb.errors import ArgumentError
-from iapb.mechanics.joints import Joint
+from iapb.mechanics.joints import Joint, Mimic
 from iapb.schema import Floats
 
 # A placement given with nine digits counts as a rotation; a coarser one would shear the body.
@@ -66,6 +66,8 @@ class Body:
     inertia : (3, 3) [kg m^2]
         About the centre of mass, body axes. Only symmetry is checked: whether the mechanism's mass
         matrix is positive definite depends on the whole chain and is checked when it is factored.
+    mimic : Mimic or None
+        What a revolute or prismatic joint follows; it has no coordinate of its own then.
     """
 
     name: str
@@ -75,6 +77,7 @@ class Body:
     mass: float = 0.0
     center_of_mass: Any = (0.0, 0.0, 0.0)
     inertia: Any = ((0.0,) * 3,) * 3
+    mimic: Mimic | None = None
 
     def __post_init__(self) -> None:
         where = f"body {self.name!r}: "
@@ -92,6 +95,8 @@ class Body:
             )
         if np.abs(inertia - inertia.T).max() > SYMMETRY_TOLERANCE * np.abs(inertia).max():
             raise ArgumentError(where + "inertia", inertia, "a symmetric matrix [kg m^2]")
+        if self.mimic is not None and self.joint.kind not in ("revolute", "prismatic"):
+            raise ArgumentError(where + "mimic", self.mimic, "a revolute or prismatic joint")
         if mass < 0.0:
             raise ArgumentError(where + "mass", mass, "at least 0 kg")
         vars(self).update(

@@ -9,7 +9,9 @@ that a free planar body has a constant mass matrix.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,3 +107,29 @@ class Joint:
         axis = np.asarray(self.axis, dtype=np.float64)
         axis = axis / np.abs(axis).max()
         return axis / math.sqrt(sum(x * x for x in axis.tolist()))
+
+
+class Mimic(NamedTuple):
+    """A revolute or prismatic joint without a coordinate of its own: its position follows one."""
+
+    body: str  # the body whose joint it follows, revolute or prismatic
+    multiplier: float = 1.0  # of its position, [rad/m, m/rad] between unlike joints
+    offset: float = 0.0  # [m, rad]
+
+
+Range = tuple[float, float]
+
+
+def ranges_of(joints: Iterable[tuple[str, Range | None, Any]]) -> dict[str, Range | None]:
+    """Return the limits of each joint's own coordinate, within those of the joints that follow it.
+
+    A joint is the name of its body, its limits, and None or what it follows, a `Mimic`.
+    """
+    listed = list(joints)
+    found = {name: limits for name, limits, mimic in listed if mimic is None}
+    for _, limits, mimic in listed:
+        if mimic is not None and limits is not None and mimic.multiplier != 0.0:
+            low, high = sorted((bound - mimic.offset) / mimic.multiplier for bound in limits)
+            own = found.get(mimic.body) or (low, high)
+            found[mimic.body] = max(low, own[0]), min(high, own[1])
+    return found

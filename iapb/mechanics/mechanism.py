@@ -84,6 +84,8 @@ class Mechanism:
         m/s or rad/s.
     arrays : MechanismArrays
         The bodies as contiguous arrays for the kernels.
+    motions : int
+        nv, and one for each joint that follows another one.
     tree_of_body : (n,) int array
     tree_dofs : list of (start, stop)
         Range in v of each tree; empty for a tree of fixed bodies.
@@ -101,7 +103,7 @@ class Mechanism:
         self.bodies: tuple[Body, ...] = tuple(bodies)
         parents, trees = parents_and_trees(self.bodies)
         self.names: tuple[str, ...] = tuple(body.name for body in self.bodies)
-        layouts = [(body.name, body.joint.layout) for body in self.bodies]
+        layouts = [(body.name, body.joint.layout) for body in self.bodies if body.mimic is None]
         self.coordinate_names = tuple(
             f"{name}.{suffix}" for name, kind in layouts for suffix in kind.coordinates
         )
@@ -116,15 +118,16 @@ class Mechanism:
         self.arrays: MechanismArrays = structure.collect_arrays(self.bodies, parents)
         self.block: Any = block(self.arrays)
         self.tree_of_body: Integers = np.array(trees, np.int64)
-        starts = self.arrays.v_start[
-            np.flatnonzero(np.diff(self.tree_of_body, prepend=-1))
-        ].tolist()
+        moved = self.tree_of_body[self.arrays.dof_body[: self.nv]]
+        counts = np.bincount(moved, minlength=1 + max(trees, default=-1))
+        stops = np.cumsum(counts)
         self.tree_dofs: list[tuple[int, int]] = list(
-            zip(starts, [*starts[1:], self.nv], strict=False)
+            zip((stops - counts).tolist(), stops.tolist(), strict=True)
         )
         parts = structure.moving_parts(self.arrays)
         self._parts: Any = block(parts)
-        self._scratch = _Scratch(len(self.bodies), len(parts.kind), self.nv)
+        self.motions = len(self.arrays.dof_body)
+        self._scratch = _Scratch(len(self.bodies), len(parts.kind), self.motions)
         self._alone: dict[int, Mechanism] = {}
         self.has_constant_mass_matrix: bool = structure.has_constant_mass_matrix(parts)
         self.has_velocity_terms: bool = structure.has_velocity_terms(parts)
@@ -156,7 +159,8 @@ class Mechanism:
 
     def neutral(self) -> Floats:
         """Return the configuration q (nq,) with every joint at its neutral position."""
-        return np.array([x for b in self.bodies for x in b.joint.layout.neutral], dtype=np.float64)
+        places = (b.joint.layout.neutral for b in self.bodies if b.mimic is None)
+        return np.array([x for place in places for x in place], dtype=np.float64)
 
     def integrate(self, q: ArrayLike, v: ArrayLike, dt: float = 1.0) -> Floats:
         """Return q (nq,) moved for dt [s] with the constant velocity v: q + v dt on vector

@@ -14,9 +14,10 @@ from math import sqrt
 
 import numpy as np
 
+from iapb.errors import ArgumentError
 from iapb.linalg import product
 from iapb.mechanics.bodies import Body
-from iapb.mechanics.joints import FREE_FLYER, PLANAR, SPHERICAL
+from iapb.mechanics.joints import FREE_FLYER, PLANAR, SPHERICAL, Mimic
 from iapb.mechanics.kernels.arrays import MechanismArrays
 from iapb.mechanics.kernels.free_motion import LINKAGE, RIGID, STRAIGHT, FreeMotion
 from iapb.schema import Floats, Integers
@@ -25,20 +26,34 @@ from iapb.schema import Floats, Integers
 def collect_arrays(bodies: tuple[Body, ...], parents: list[int]) -> MechanismArrays:
     """Return the bodies as contiguous arrays; parents (n,) are body indices, -1 = world."""
     layouts, count = [body.joint.layout for body in bodies], len(bodies)
-    q_count, v_count = (
-        np.array(counts, np.int64) for counts in ([k.nq for k in layouts], [k.nv for k in layouts])
-    )
+    follows = np.array([body.mimic is not None for body in bodies], np.bool_)
+    v_count = np.array([layout.nv for layout in layouts], np.int64)
+    q_own = np.where(follows, 0, np.array([layout.nq for layout in layouts], np.int64))
+    v_own = np.where(follows, 0, v_count)
+    q_start, v_start, total = np.cumsum(q_own) - q_own, np.cumsum(v_own) - v_own, int(v_own.sum())
+    v_start[follows] = total + np.arange(follows.sum())
+    motions = int(v_count.sum())
     last_dof: list[int] = []  # of each body, on the path from the world
-    dof_parent: list[int] = []
-    for parent, own in zip(parents, v_count.tolist(), strict=True):
-        first, last = len(dof_parent), last_dof[parent] if parent >= 0 else -1
-        dof_parent += [last, *range(first, first + own)][:own]
-        last_dof.append(first + own - 1 if own else last)
+    dof_parent, dof_body = np.zeros((2, motions), np.int64)
+    dof_rotates = np.zeros(motions, np.bool_)
+    dof_leader, dof_ratio = np.arange(motions), np.ones(motions)
+    dof_offset = np.zeros(motions)
+    for b, (parent, layout) in enumerate(zip(parents, layouts, strict=True)):
+        last = last_dof[parent] if parent >= 0 else -1
+        for k, turns in enumerate(layout.rotating, int(v_start[b])):
+            dof_parent[k], dof_body[k], dof_rotates[k] = last, b, turns
+            last = k
+        last_dof.append(last)
+    for b in np.flatnonzero(follows).tolist():
+        mimic, k = bodies[b].mimic or Mimic(""), v_start[b]
+        leader = _leader(bodies, mimic.body)
+        q_start[b], dof_leader[k] = q_start[leader], v_start[leader]
+        dof_ratio[k], dof_offset[k] = mimic.multiplier, mimic.offset
     return MechanismArrays(
         kind=np.array([layout.code for layout in layouts], np.int64),
         parent=np.array(parents, np.int64),
-        q_start=np.cumsum(q_count) - q_count,
-        v_start=np.cumsum(v_count) - v_count,
+        q_start=q_start,
+        v_start=v_start,
         v_count=v_count,
         joint_axis=np.array([body.joint.unit_axis for body in bodies]).reshape(count, 3),
         placement_rotation=np.array([body.placement[0] for body in bodies]).reshape(count, 3, 3),
@@ -47,11 +62,23 @@ def collect_arrays(bodies: tuple[Body, ...], parents: list[int]) -> MechanismArr
         center_of_mass=np.array([body.center_of_mass for body in bodies]).reshape(count, 3),
         inertia=np.array([body.inertia for body in bodies]).reshape(count, 3, 3),
         last_dof=np.array(last_dof, np.int64),
-        dof_body=np.repeat(np.arange(count), v_count),
-        dof_parent=np.array(dof_parent, np.int64),
-        dof_rotates=np.array([turns for layout in layouts for turns in layout.rotating], np.bool_),
+        dof_body=dof_body,
+        dof_parent=dof_parent,
+        dof_rotates=dof_rotates,
+        dof_leader=dof_leader,
+        dof_ratio=dof_ratio,
+        dof_offset=dof_offset,
         quaternions=any(layout.code in (SPHERICAL, FREE_FLYER) for layout in layouts),
     )
+
+
+def _leader(bodies: tuple[Body, ...], name: str) -> int:
+    """Return the body whose joint another one follows."""
+    for i, body in enumerate(bodies):
+        leads = body.mimic is None and body.joint.kind in ("revolute", "prismatic")
+        if body.name == name and leads:
+            return i
+    raise ArgumentError("mimic", name, "a revolute or prismatic body that follows no other")
 
 
 def moving_parts(m: MechanismArrays) -> MechanismArrays:

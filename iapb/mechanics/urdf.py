@@ -3,7 +3,7 @@
 The reader is independent of Pinocchio's, so a comparison of the two also checks the reading. Order
 and layout of q and v are those of `pin.buildModelFromUrdf`: depth first, children of a link in the
 alphabetical order of their joints' names; continuous joints (cos, sin); floating joints as SE(3)
-with velocities in body axes; mimic joints independent. Only planar joints differ: they are the
+with velocities in body axes; mimic joints without coordinates of their own. Only planar joints differ: they are the
 engine's own `planar`, in the plane across their axis. Fixed joints stay as bodies without degrees
 of freedom.
 
@@ -19,6 +19,7 @@ import difflib
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
@@ -27,7 +28,7 @@ import numpy as np
 from iapb.errors import ArgumentError
 from iapb.linalg import product
 from iapb.mechanics.bodies import Body
-from iapb.mechanics.joints import Joint
+from iapb.mechanics.joints import Joint, Mimic
 from iapb.mechanics.rotations import rotation_of
 from iapb.mechanics.structure import turned_inertia
 from iapb.names import one_of
@@ -120,12 +121,11 @@ def read_robot(
     inertials = {
         name: _inertial(element) for name, element in elements_by_name(robot, "link").items()
     }
-    joints = _Joints(ignored)
+    elements = elements_by_name(robot, "joint")
+    joints = _Joints(elements, ignored)
     held: dict[str, tuple[str, Link]] = {}  # link -> its parent, and the link without inertia
     children: dict[str, list[str]] = {name: [] for name in inertials}
-    for name, element in sorted(
-        elements_by_name(robot, "joint").items(), key=lambda item: item[0].encode()
-    ):
+    for name, element in sorted(elements.items(), key=lambda item: item[0].encode()):
         where = where_of(element)
         parent, child = (_end(element, tag, inertials) for tag in ("parent", "child"))
         if child in held:
@@ -232,19 +232,40 @@ def _to_axis(axis: Floats) -> Floats:
 
 
 class _Joints:
-    """Reads limits and dynamics of the joints, and keeps what is to be said about them."""
+    """Reads what joints have beside their kind, and keeps what is to be said about it."""
 
-    def __init__(self, ignored: Counter[str]) -> None:
-        self.ignored = ignored
+    def __init__(self, elements: dict[str, ElementTree.Element], ignored: Counter[str]) -> None:
+        self.elements, self.ignored = elements, ignored
         self.empty: list[str] = []  # joints whose range is a point
         self.unlimited: list[str] = []
 
     def link(self, element: ElementTree.Element, body: Body) -> Link:
         """Return a body with what its joint has."""
         damping, friction = (self._dynamics(element, name) for name in ("damping", "friction"))
-        self.ignored["<mimic>, the joint moves by itself"] += element.find("mimic") is not None
         name = str(element.get("name"))
+        if mimic := self._mimic(element, name):
+            kind = "prismatic" if body.joint.kind == "prismatic" else "revolute"
+            body = replace(body, joint=Joint(kind, body.joint.axis), mimic=mimic)
         return Link(body, body.name, name, self._limits(element), damping, friction)
+
+    def _mimic(self, element: ElementTree.Element, name: str) -> Mimic | None:
+        """Return what a joint follows; a fixed joint follows nothing."""
+        mimic, kind = element.find("mimic"), element.get("type")
+        if mimic is None:
+            return None
+        if kind == "fixed":
+            self.ignored["<mimic> of fixed joints"] += 1
+            return None
+        where, leader = f"{where_of(element)} mimic", mimic.get("joint", "")
+        found = self.elements.get(leader)
+        leads = found is not None and found.get("type") in WITH_RANGE
+        child = found.find("child") if found is not None and found.find("mimic") is None else None
+        if kind not in WITH_DYNAMICS or not leads or child is None:
+            expected = "a revolute, continuous or prismatic joint that follows a revolute or "
+            expected += f"prismatic one, which follows none; {_leaving(name, 'mimic')}"
+            raise ArgumentError(where, leader, expected)
+        multiplier = _number(where, mimic, "multiplier", "1")
+        return Mimic(child.get("link", ""), multiplier, _number(where, mimic, "offset", "0"))
 
     def _limits(self, element: ElementTree.Element) -> tuple[float, float] | None:
         limit, kind, name = element.find("limit"), element.get("type"), str(element.get("name"))

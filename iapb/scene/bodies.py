@@ -212,6 +212,28 @@ JointDamping = Annotated[
 ]
 
 
+JointFriction = Annotated[
+    tuple[NonNegative, ...],
+    BeforeValidator(
+        lambda given: (given,) if isinstance(given, int | float) else given,
+        json_schema_input_type=NonNegative | tuple[NonNegative, ...],
+    ),
+    Field(
+        description="Coulomb's dry friction of its joint [N, N m], one number per velocity; default: none"
+    ),
+]
+
+
+class JointMimic(ScenePart):
+    """What a joint follows: position = multiplier × position of a body's joint + offset."""
+
+    body: Name = Field(
+        description="the body whose joint it follows, revolute or prismatic, in the same tree"
+    )
+    multiplier: Number = Field(1.0, description="of its position [1, rad/m, m/rad]; default 1")
+    offset: Number = Field(0.0, description="added to it [m, rad]; default 0")
+
+
 def _in_one_form(given: Any, validate: ValidatorFunctionWrapHandler) -> Any:
     """Refuse what has no form of an inertia once, not once for each form."""
     try:
@@ -235,7 +257,7 @@ class AnyBody(ScenePart):
 
     The joint frame has the position `origin` and the rotation `angle` or `rpy` in the parent body's
     frame. The joint moves the body frame relative to the joint frame. A body may be massless if
-    those that it carries give its joint mass to move (`iapb.scene.mechanism.unmoved_body`).
+    those that it carries give its joint mass to move (`iapb.scene.mechanism.joint_fault`).
     """
 
     center_of_mass: Any
@@ -247,6 +269,11 @@ class AnyBody(ScenePart):
     )
     inertia: Any
     shapes: tuple[Any, ...]
+    joint_mimic: JointMimic | None = Field(
+        None,
+        description="what its revolute or prismatic joint follows; it has no position, velocity or "
+        "coordinate of its own then; default: nothing",
+    )
     position: tuple[Number, ...] = Field(
         (), description="joint coordinates at the start [m, rad]; default: at rest"
     )
@@ -258,6 +285,7 @@ class AnyBody(ScenePart):
     restitution: OwnRestitution = None
     friction: OwnFriction = None
     joint_damping: JointDamping = ()
+    joint_friction: JointFriction = ()
     joint_limits: tuple[Number, Number] | None = Field(
         None,
         description="least and largest position of its revolute or prismatic joint [rad, m]; default: no limits",
@@ -303,7 +331,14 @@ class AnyBody(ScenePart):
         )
 
     @field_validator(
-        "axis", "position", "velocity", "joint_damping", "joint_limits", check_fields=False
+        "axis",
+        "joint_mimic",
+        "position",
+        "velocity",
+        "joint_damping",
+        "joint_friction",
+        "joint_limits",
+        check_fields=False,
     )
     @classmethod
     def _fits_the_joint(cls, given: Any, info: ValidationInfo) -> Any:
@@ -319,7 +354,15 @@ class AnyBody(ScenePart):
                 f"the direction of the {joint} joint",
             )
             return given and with_direction(given)
-        if field == "joint_limits" and given is not None:
+        follows = info.data.get("joint_mimic")
+        if field == "joint_mimic":
+            require(
+                given is None or joint in ("revolute", "prismatic"),
+                f"no mimic: a {joint} joint follows none",
+            )
+        elif follows and field in ("position", "velocity"):
+            require(not given, f"no {field}: the joint follows that of {follows.body}")
+        elif field == "joint_limits" and given is not None:
             start = (info.data.get("position") or given)[0]
             require(joint in ("revolute", "prismatic"), f"no limits: a {joint} joint has none")
             require(given[0] < given[1], "two numbers, the smaller one first")

@@ -18,7 +18,7 @@ from iapb.contact.kernels.world import Stops
 from iapb.errors import ArgumentError
 from iapb.linalg import product
 from iapb.mechanics.bodies import Body
-from iapb.mechanics.joints import KINDS, Joint
+from iapb.mechanics.joints import KINDS, Joint, Mimic, ranges_of
 from iapb.mechanics.mechanism import Mechanism
 from iapb.mechanics.rotations import rotation_of
 from iapb.scene.bodies import WORLD, inertia_matrix
@@ -44,6 +44,7 @@ def mechanism_of(scene: Scene) -> Mechanism:
 
 def _body_in_space(body: Any) -> Body:
     flat = len(body.origin) == 2
+    mimic = body.joint_mimic
     rotation, lift = np.eye(3), (0.0,) if flat else ()
     turn = _turn(body)
     rotation[: len(turn), : len(turn)] = turn
@@ -55,6 +56,7 @@ def _body_in_space(body: Any) -> Body:
         mass=body.mass,
         center_of_mass=np.array([*body.center_of_mass, *lift]),
         inertia=np.diag([0.5, 0.5, 1.0]) * body.inertia if flat else inertia_matrix(body.inertia),
+        mimic=mimic and Mimic(mimic.body, mimic.multiplier, mimic.offset),
     )
 
 
@@ -74,25 +76,29 @@ def start_of(scene: Scene) -> tuple[Floats, Floats]:
     return np.array(q, np.float64), np.array(v, np.float64)
 
 
-def unmoved_body(scene: Scene) -> tuple[int, str, str] | None:
-    """Return the first body whose joint moves no mass at the start, its joint, and what was
-    expected; None if M is positive definite.
+def joint_fault(scene: Scene) -> tuple[int, str, Any, str] | None:
+    """Return a body whose start is outside the limits of what follows its joint, or whose joint
+    moves no mass at the start; the field, its value and what was expected. None: nothing is wrong.
 
-    M is computed only if a joint moves neither mass nor inertia of its own body, which a body
-    that it carries may have.
+    The mass matrix is computed only if a joint moves neither mass nor inertia of its own body,
+    which a body that it carries may have.
     """
+    for i, (body, limits) in enumerate(zip(scene.bodies, limits_of(scene), strict=True)):
+        if limits and not limits[0] <= body.position[0] <= limits[1]:
+            said = f"a start within [{limits[0]:g}, {limits[1]:g}], the limits of {body.name} and "
+            return i, "position", list(body.position), f"{said}of what follows it"
     if all(_moves_its_own(body) for body in scene.bodies):
         return None
-    mechanism = mechanism_of(scene)
-    k = mechanism.unmoved_velocity(start_of(scene)[0])
+    mechanism, (q, _) = mechanism_of(scene), start_of(scene)
+    k = mechanism.unmoved_velocity(q)
     if k is None:
         return None
     i = int(mechanism.arrays.dof_body[k])
-    name, turns = scene.bodies[i].name, mechanism.arrays.dof_rotates[k]
-    alone = f"no mass {'turns about it' if turns else 'moves along it'}"
-    if mechanism.mass_matrix(start_of(scene)[0])[k, k] > SMALLEST_POSITIVE:
-        alone = "no mass lies between it and joints that move alike"
-    return i, scene.bodies[i].joint, f"mass or inertia that it moves ({name}: {alone})"
+    body = scene.bodies[i]
+    why = "no mass turns about it" if mechanism.arrays.dof_rotates[k] else "no mass moves along it"
+    if mechanism.mass_matrix(q)[k, k] > SMALLEST_POSITIVE:
+        why = "no mass lies between it and joints that move alike"
+    return i, "joint", body.joint, f"mass or inertia that it moves ({body.name}: {why})"
 
 
 def _moves_its_own(body: Any) -> bool:
@@ -103,11 +109,11 @@ def _moves_its_own(body: Any) -> bool:
     return body.joint == "fixed" or bool(min(body.mass, inertia) >= SMALLEST_POSITIVE)
 
 
-def require_moved(scene: Scene) -> None:
-    """Raise ArgumentError if a joint moves no mass at the start; see `unmoved_body`."""
-    if unmoved := unmoved_body(scene):
-        i, joint, expected = unmoved
-        raise ArgumentError(f"joint of {scene.bodies[i].name}", joint, expected)
+def require_joints(scene: Scene) -> None:
+    """Raise ArgumentError for what `joint_fault` finds."""
+    if fault := joint_fault(scene):
+        i, field, value, expected = fault
+        raise ArgumentError(f"{field} of {scene.bodies[i].name}", value, expected)
 
 
 def wrench_of(scene: Scene, time: float) -> Floats:
@@ -120,8 +126,37 @@ def wrench_of(scene: Scene, time: float) -> Floats:
 
 def joint_damping_of(scene: Scene) -> Floats:
     """Return the viscous damping (nv,) of each velocity [N s/m, N m s/rad]."""
-    given = [body.joint_damping or (0.0,) * KINDS[body.joint].nv for body in scene.bodies]
-    return np.array([x for each in given for x in each], np.float64)
+    return _by_velocity(scene, "joint_damping", 2)
+
+
+def joint_friction_of(scene: Scene) -> Floats:
+    """Return the dry friction (nv,) of each velocity [N, N m]."""
+    return _by_velocity(scene, "joint_friction", 1)
+
+
+def _by_velocity(scene: Scene, field: str, power: int) -> Floats:
+    """Return the values of a field by velocity. A joint that follows another one adds its own to
+    those of the leader, times a power of the multiplier."""
+    values: list[float] = []
+    starts: dict[str, int] = {}
+    followers = []
+    for body in scene.bodies:
+        given = getattr(body, field) or (0.0,) * KINDS[body.joint].nv
+        starts[body.name] = len(values)
+        if body.joint_mimic is None:
+            values += given
+        else:
+            followers.append((body.joint_mimic, given[0]))
+    for mimic, value in followers:
+        values[starts[mimic.body]] += abs(mimic.multiplier) ** power * value
+    return np.array(values, np.float64)
+
+
+def limits_of(scene: Scene) -> list[tuple[float, float] | None]:
+    """Return the limits of each body's own coordinate, within those of the joints that follow
+    it."""
+    ranges = ranges_of((body.name, body.joint_limits, body.joint_mimic) for body in scene.bodies)
+    return [ranges.get(body.name) for body in scene.bodies]
 
 
 def _parents(scene: Scene) -> list[int]:
@@ -230,7 +265,8 @@ def stops_of(scene: Scene, mechanism: Mechanism) -> Stops:
     for i, parent in reversed(list(enumerate(parents))):
         if parent >= 0:
             carried[parent] += carried[i]
-    limited = [i for i, body in enumerate(scene.bodies) if body.joint_limits is not None]
+    limits = limits_of(scene)
+    limited = [i for i, own in enumerate(limits) if own is not None]
     inertia = np.diagonal(mechanism.mass_matrix(start_of(scene)[0])) if limited else np.zeros(0)
     turned = [
         float(inertia[arrays.v_start[i]]) if scene.bodies[i].joint == "revolute" else 0.0
@@ -242,7 +278,7 @@ def stops_of(scene: Scene, mechanism: Mechanism) -> Stops:
     ]
     body, bounds = (
         np.repeat(np.array(limited, np.int64), 2),
-        [scene.bodies[i].joint_limits or () for i in limited],
+        [limits[i] or () for i in limited],
     )
     shape = len(_owned_shapes(scene)) + np.arange(len(body), dtype=np.int64)
     return Stops(
@@ -258,7 +294,7 @@ def stops_of(scene: Scene, mechanism: Mechanism) -> Stops:
 
 
 def _stop_count(scene: Scene) -> int:
-    return 2 * sum(body.joint_limits is not None for body in scene.bodies)
+    return 2 * sum(limits is not None for limits in limits_of(scene))
 
 
 def restitution_by_shape(scene: Scene) -> Floats:

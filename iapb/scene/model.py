@@ -477,6 +477,7 @@ def _across_parts(given: Any) -> Mistakes:
             yield ("bodies", i), names[i], f"its place among the other bodies of {roots[i]}'s tree"
     if bodies and all(body.get("joint") == "fixed" for body in bodies):
         yield ("bodies", 0, "joint"), "fixed", "at least one body of the scene that can move"
+    yield from _mimics(bodies, names, roots)
     count = len(walls) + sum(len(_mappings(body, "shapes")) for body in bodies)
     if count > MAX_SHAPES:
         yield ("bodies",), f"{count} shapes", f"at most {MAX_SHAPES} shapes, walls included"
@@ -508,6 +509,21 @@ def _roots(bodies: list[dict[str, Any]]) -> list[str | None]:
     return [root[_text(body, "name")] for body in bodies]
 
 
+def _mimics(
+    bodies: list[dict[str, Any]], names: list[str | None], roots: list[str | None]
+) -> Mistakes:
+    """Check that each joint that follows another one finds it, with a coordinate, in its tree."""
+    for i, body in enumerate(bodies):
+        leader = _text(body.get("joint_mimic"), "body")
+        if leader is None:
+            continue
+        found = bodies[names.index(leader)] if leader in names else {}
+        one = _text(found, "joint") in ("revolute", "prismatic") and not found.get("joint_mimic")
+        if not one or roots[names.index(leader)] != roots[i]:
+            expected = "a revolute or prismatic body of the same tree that follows no other"
+            yield ("bodies", i, "joint_mimic", "body"), leader, expected
+
+
 def _tool(
     given: Any, bodies: list[dict[str, Any]], names: list[str | None], roots: list[str | None]
 ) -> Mistakes:
@@ -528,7 +544,9 @@ def _tool(
     if root is None or None in roots or not all(joint in KINDS for joint in joints):
         return
     coordinates = sum(
-        KINDS[str(joint)].nv for joint, own in zip(joints, roots, strict=True) if own == root
+        KINDS[str(joint)].nv
+        for joint, own, body in zip(joints, roots, bodies, strict=True)
+        if own == root and not body.get("joint_mimic")
     )
     if coordinates == 0:
         yield ("hand", "body"), held, "a body that can move"

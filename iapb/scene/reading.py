@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from iapb.errors import ArgumentError, Mistake, SceneError, shown
 from iapb.names import nearest, one_of
 from iapb.scene.document import MAX_CHARACTERS, Document
-from iapb.scene.mechanism import unmoved_body
+from iapb.scene.mechanism import joint_fault
 from iapb.scene.model import Scene, scene_kind
 from iapb.scene.parts import ScenePart, mistakes_of, written
 from iapb.scene.robots import told, with_robots
@@ -132,11 +132,11 @@ def scene_from_text(text: str, file: str = "(text)") -> Scene:
     given, added = with_robots(document)
     try:
         scene = checked(scene_kind(given), given, document, added.mistakes)
-        if unmoved := unmoved_body(scene):
-            path = ("bodies", unmoved[0], "joint")
-            name = written(path) if added.origins else f"joint of {scene.bodies[unmoved[0]].name}"
-            where = Mistake(file, *document.place(path), name, *unmoved[1:])
-            raise SceneError([where])
+        if fault := joint_fault(scene):
+            i, field, value, expected = fault
+            path = ("bodies", i, field)
+            name = written(path) if added.origins else f"{field} of {scene.bodies[i].name}"
+            raise SceneError([Mistake(file, *document.place(path), name, str(value), expected)])
     except SceneError as failure:
         raise SceneError(told(failure.mistakes, added, document)) from None
     if given is document.value:

@@ -26,7 +26,7 @@ from pydantic import Field, ValidationError
 
 from iapb.errors import ArgumentError, Mistake, shown
 from iapb.linalg import product
-from iapb.mechanics.joints import KINDS
+from iapb.mechanics.joints import KINDS, Range, ranges_of
 from iapb.names import one_of
 from iapb.scene.bodies import ORIGIN, WORLD, SpatialBody, SpatialShape
 from iapb.scene.document import Document
@@ -162,6 +162,7 @@ def bodies_of(robot: Robot, folder: Path, added: Added, number: int) -> list[dic
                 )
     added.remarks.extend(f"robot {robot.name}, {robot.urdf}: {remark}" for remark in remarks)
     bodies = []
+    ranges = ranges_of((link.body.name, link.limits, link.body.mimic) for link in links)
     for link in links:
         body = link.body
         rotation, origin = body.placement
@@ -172,11 +173,12 @@ def bodies_of(robot: Robot, folder: Path, added: Added, number: int) -> list[dic
                 product(turn, origin) + np.array(robot.origin),
             )
         kind = KINDS[body.joint.kind]
-        start = _start(robot, link)
-        if start != (robot.position.get(link.name) or kind.neutral):
+        limits = ranges.get(body.name)
+        start = _start(robot, link, limits)
+        if start and not body.mimic and start != (robot.position.get(link.name) or kind.neutral):
             added.remarks.append(
                 f"robot {robot.name}: {link.name} starts at {start[0]:g}, the limit of joint "
-                f"{link.joint}, for 0 is outside its limits {list(link.limits or ())}"
+                f"{link.joint}, for 0 is outside its limits {list(limits or ())}"
             )
         added.origins.append((number, body.name, link.joint))
         bodies.append(
@@ -197,18 +199,29 @@ def bodies_of(robot: Robot, folder: Path, added: Added, number: int) -> list[dic
                 "velocity": list(robot.velocity.get(link.name, ())),
                 "joint_limits": link.limits and list(link.limits),
                 "joint_damping": [link.damping] * (link.damping > 0.0),
+                "joint_friction": [link.friction] * (link.friction > 0.0),
+                "joint_mimic": body.mimic
+                and {**body.mimic._asdict(), "body": _body_name(robot, body.mimic.body)},
             }
         )
     return bodies
 
 
-def _start(robot: Robot, link: Link) -> tuple[float, ...]:
+def _start(robot: Robot, link: Link, limits: Range | None) -> tuple[float, ...]:
     """Return the start of a link's joint: as given, else the neutral one or the nearest within the
     limits."""
     neutral, given = KINDS[link.body.joint.kind].neutral, robot.position.get(link.name)
-    if link.limits is None or (given and len(given) != 1):
+    if link.body.mimic:
+        return given or ()
+    if limits is None or (given and len(given) != 1):
         return given or neutral
-    low, high = link.limits
+    low, high = limits
+    if low > high:
+        raise ArgumentError(
+            f"limits of robot {robot.name}, link {link.name}",
+            [low, high],
+            f"limits of joint {link.joint} and of those that follow it with a range in common",
+        )
     if given and not low <= given[0] <= high:
         raise ArgumentError(
             f"position of robot {robot.name}, link {link.name}",

@@ -260,7 +260,7 @@ def compare(
 def _swung(mechanism: Mechanism, q: Floats, v: Floats) -> float:
     """Sum of m |c| w^2 [N], or of m v^2 [N m]: the size of the terms of a bias, whose sum may be
     near zero."""
-    fastest = float(np.max(np.abs(v[mechanism.arrays.dof_rotates]), initial=0.0))
+    fastest = float(np.max(np.abs(v[mechanism.arrays.dof_rotates[: mechanism.nv]]), initial=0.0))
     return max(fastest**2 * _spread(mechanism, q), 2.0 * mechanism.kinetic_energy(q, v))
 
 

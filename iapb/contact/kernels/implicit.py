@@ -4,11 +4,12 @@ makes energy.
 v* is the velocity after impulses and applied forces. Over the contacts of a group, with γ = J v and
 gap φ <= 0,
 
-    v⁺ = argmin ½ (v − v*)ᵀ M (v − v*) + Σ Δt f(γ)²/2k + Σ c h(|w|),   f = max(0, −K φ − k γ),   k =
+    v⁺ = argmin ½ (v − v*)ᵀ M (v − v*) + Σ Δt f(γ)²/2k + Σ c h(|w|) + Σ Δt F h(|v_i|),   f = max(0, −K φ − k γ),   k =
     K Δt + B,
 
 w the tangential velocities, c = μ Δt f the limit of friction, and h(|w|) = |w|, rounded below the
-speed STICKING so that it has a derivative: a contact that sticks creeps more slowly than that. The
+speed STICKING so that it has a derivative: a contact that sticks creeps more slowly than that. F is
+the dry friction of a joint [N, N m], also of trees without contact. The
 function is strictly convex: one answer, also where contacts are redundant. M contains Δt D of
 damped joints. Newton's method with a line search solves it, from the velocity before the step's
 forces, which at rest is the answer. The limits of friction follow from the forces, so both are
@@ -42,6 +43,7 @@ TURNS = 12  # of the limits of friction in a step; the next step goes on from th
 FREE_TURNS = (
     3  # of these take the new limits whole; the others half, for limits that swing to and fro
 )
+DRY = -2  # in place of the first contact of a group that has joint friction alone
 SETTLED = 1e-3  # share of a limit of friction whose change ends the turns
 SEARCHES = 40  # evaluations of a line search
 GAIN = 1e-11  # share of the energy of a step that rounding may seem to create
@@ -79,6 +81,7 @@ class RestWork(NamedTuple):
     change: Annotated[Floats, "row"]  # J Δv of a Newton step
     v: Annotated[Floats, "velocity"]  # local velocities
     free: Annotated[Floats, "velocity"]  # v*
+    dry: Annotated[Floats, "velocity"]  # limits Δt F of joint friction [N s, N m s]
     balance: Annotated[Floats, "velocity"]  # M (v − v*) − Jᵀ p
     change_of_v: Annotated[Floats, "velocity"]  # v − v*
     step: Annotated[Floats, "velocity"]  # Newton step
@@ -88,18 +91,22 @@ class RestWork(NamedTuple):
 
 
 @kernel
-def rest_implicitly(world, state, rubs):
-    """Give v the forces of all resting contacts; write them to the contacts, to penalty_force and
-    friction_force."""
+def rest_implicitly(world, state, touches, rubs):
+    """Give v the forces of all resting contacts and of joint friction; write them to the contacts,
+    to penalty_force and friction_force."""
     work, contacts, some = state.rest_work, state.contacts, False
     work.first[:] = -1
-    for i in range(state.contact_count[0] - 1, -1, -1):
+    for i in range(state.contact_count[0] - 1 if touches else -1, -1, -1):
         contacts.normal_force[i] = 0.0
         if rubs:
             store(contacts.friction_force, i, (0.0, 0.0, 0.0))
         group = group_of_contact(world, contacts, i, state.group_of_tree)
         if contacts.mark[i] != LEFT:
             work.next[i], work.first[group], some = work.first[group], i, True
+    for t in range(world.tree_start.shape[0] if world.switches.joint_friction else 0):
+        if is_dry(world, t):
+            group, some = state.group_of_tree[t], True
+            work.first[group] = work.first[group] if work.first[group] >= 0 else DRY
     if not some:
         return
     work.next_tree[:] = -1
@@ -108,8 +115,24 @@ def rest_implicitly(world, state, rubs):
         if group != t:  # its first tree is the group's number
             work.next_tree[t], work.next_tree[group] = work.next_tree[group], t
     for group in range(world.tree_start.shape[0]):
-        if work.first[group] >= 0:
+        if work.first[group] >= 0 or work.first[group] == DRY:
             rest_group(world, state, group, 1 + world.tangents if rubs else 1)
+
+
+@kernel
+def is_dry(world, t):
+    """Return whether a joint of tree t has friction."""
+    found = False
+    for k in range(world.tree_start[t], world.tree_stop[t]):
+        found = found or world.joint_friction[k] > 0.0
+    return found
+
+
+@kernel
+def dry_impulse(work, i, speed):
+    """Return the impulse of joint friction against the speed of local coordinate i: Δt F, less
+    below STICKING."""
+    return work.dry[i] * speed / max(abs(speed), STICKING)
 
 
 @kernel
@@ -125,6 +148,7 @@ def rest_group(world, state, group, s):
             work.dof[size], work.begin[size], work.envelope[size] = dof, begin, begin
             work.end[size] = begin + world.tree_stop[t] - world.tree_start[t]
             work.free[size], work.v[size] = state.v[dof], state.start_v[dof]
+            work.dry[size] = world.dt * world.joint_friction[dof]
             size += 1
         t = work.next_tree[t]
     work.energy[0] = -1.0  # not known yet
@@ -275,13 +299,16 @@ def set_impulses(world, state, count, s, k, share):
 
 
 @kernel
-def slope(world, state, count, s, k, share, linear, quadratic):
+def slope(world, state, size, count, s, k, share, linear, quadratic):
     """Write the impulses at `share` of the Newton step; return the derivative of the minimised
     function along it."""
     total = linear + share * quadratic
     set_impulses(world, state, count, s, k, share)
     for j in range(count * s):
         total -= state.rest_work.p[j] * state.rest_work.change[j]
+    for i in range(size if world.switches.joint_friction else 0):
+        speed = state.rest_work.v[i] + share * state.rest_work.step[i]
+        total += dry_impulse(state.rest_work, i, speed) * state.rest_work.step[i]
     return total
 
 
@@ -303,6 +330,8 @@ def open_balance(world, state, size, count, s, k):
             if work.p[j] != 0.0:
                 add_along_row(work, r, j, -work.p[j], work.balance)
         squares += work.p[r * s] * work.p[r * s]
+    for i in range(size if world.switches.joint_friction else 0):
+        work.balance[i] += dry_impulse(work, i, work.v[i])
     given, springs = work.given[:size], 0.5 * squares / (world.dt * k) if squares > 0.0 else 0.0
     for i in range(size):  # |L⁻¹ r|² = rᵀ M⁻¹ r
         dof = work.dof[i]
@@ -353,6 +382,8 @@ def newton_matrix(world, state, size, count, s, k):
             matrix[i, j] = state.mass_matrix[dof, dof - i + j]
         if world.switches.joint_damping:
             matrix[i, i] += world.dt * world.joint_damping[dof]
+        if world.switches.joint_friction and abs(work.v[i]) <= STICKING:
+            matrix[i, i] += work.dry[i] / STICKING
     for r in range(count):
         n = r * s
         if work.p[n] > 0.0:
@@ -418,7 +449,7 @@ def solve(world, state, size, count, s, k):
             step[i] = -work.balance[i]
         solve_envelope(state.work.lower, work.envelope, size, step)
         along_rows(work, count, s, step, work.change)
-        if is_quadratic(world, state, count, s, k):  # the step is exact
+        if is_quadratic(world, state, size, count, s, k):  # the step is exact
             add_multiple(v, 1.0, step)
             set_impulses(world, state, count, s, k, 1.0)
             add_multiple(work.speed[: count * s], 1.0, work.change)
@@ -432,10 +463,19 @@ def solve(world, state, size, count, s, k):
 
 
 @kernel
-def is_quadratic(world, state, count, s, k):
+def is_quadratic(world, state, size, count, s, k):
     """Return whether the same contacts push at the end of the Newton step as before, and all with
-    friction stick."""
+    friction stick; joints with friction stick, or slide on in their direction."""
     work = state.rest_work
+    for i in range(size if world.switches.joint_friction else 0):
+        speed, after = work.v[i], work.v[i] + work.step[i]
+        slides = max(abs(speed), abs(after)) > STICKING
+        if (
+            work.dry[i] > 0.0
+            and slides
+            and not (min(abs(speed), abs(after)) > STICKING and speed * after > 0.0)
+        ):
+            return False
     for r in range(count):
         j = r * s
         if (work.p[j] > 0.0) != (push(world, state, r, k, work.speed[j] + work.change[j]) > 0.0):
@@ -456,14 +496,14 @@ def line_search(world, state, size, count, s, k):
     linear = mass_form(world, state, size, work.change_of_v, work.step)
     quadratic = mass_form(world, state, size, work.step, work.step)
     low, high = 0.0, 1.0
-    at_low = slope(world, state, count, s, k, 0.0, linear, quadratic)
-    at_high = slope(world, state, count, s, k, 1.0, linear, quadratic)
+    at_low = slope(world, state, size, count, s, k, 0.0, linear, quadratic)
+    at_high = slope(world, state, size, count, s, k, 1.0, linear, quadratic)
     start = 1e-3 * abs(at_low)
     if at_low >= 0.0 or not at_high > start:
         return 1.0
     for _ in range(SEARCHES):
         share = low + (high - low) * at_low / (at_low - at_high)
-        found = slope(world, state, count, s, k, share, linear, quadratic)
+        found = slope(world, state, size, count, s, k, share, linear, quadratic)
         if abs(found) <= start:
             return share
         if found > 0.0:
@@ -530,6 +570,8 @@ def give_back(world, state, size, count, s):
     pushed, rubbed = work.given[:size], work.step[:size]
     for i in range(size):
         pushed[i] = rubbed[i] = 0.0
+        if world.switches.joint_friction:
+            rubbed[i] = -dry_impulse(work, i, work.v[i]) / world.dt
     for r in range(count):
         i, force = work.contact[r], (0.0, 0.0, 0.0)
         contacts.normal_force[i] = work.p[r * s] / world.dt

@@ -41,7 +41,7 @@ def add_body_row(m, w, body, x, n, factor, out, shift=0):
             square = dot(j, j) + dot(x, x) + dot(o, o)
         entry = dot(n, j)
         if not entry * entry <= ROW_NOISE * ROW_NOISE * square:  # NaN is no noise
-            out[shift + k] += factor * entry
+            out[shift + m.dof_leader[k]] += m.dof_ratio[k] * factor * entry
         k = m.dof_parent[k]
 
 
@@ -114,7 +114,7 @@ def twist(m, w, body, v):
     p = load(w.position, body)
     k = m.last_dof[body]
     while k >= 0:
-        rate = scale(v[k], load(w.axis, k))
+        rate = scale(m.dof_ratio[k] * v[m.dof_leader[k]], load(w.axis, k))
         if m.dof_rotates[k]:
             omega = add(omega, rate)
             rate = cross(rate, subtract(p, load(w.position, m.dof_body[k])))

@@ -22,7 +22,7 @@ from iapb.compiled import copy_into, kernel
 from iapb.contact.kernels.broadphase import near_pairs
 from iapb.contact.kernels.collide import resolve_collisions
 from iapb.contact.kernels.contact_set import TOUCHING, classify, cluster, group_of_contact, mark_new
-from iapb.contact.kernels.implicit import rest_implicitly
+from iapb.contact.kernels.implicit import is_dry, rest_implicitly
 from iapb.contact.kernels.joint_stops import add_stops
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.resting import resting_force
@@ -169,7 +169,8 @@ def move(world, state, applied):
     accelerate(world, state, applied)
     add_multiple(state.v, world.dt, state.acceleration)
     touches = world.switches.contacts and world.switches.implicit_contact
-    if (touches or world.switches.joint_damping) and not implicit_forces(world, state, touches):
+    implicit = touches or world.switches.joint_damping or world.switches.joint_friction
+    if implicit and not implicit_forces(world, state, touches):
         return NOT_POSITIVE_DEFINITE
     finite = True
     for k in range(state.v.shape[0]):
@@ -184,13 +185,13 @@ def move(world, state, applied):
 
 @kernel
 def implicit_forces(world, state, touches):
-    """Apply joint damping and contact, from the state at the start of the step. Return False if M
+    """Apply joint damping, joint friction and contact, from the state at the start of the step. Return False if M
     is not definite."""
     damped = world.switches.joint_damping
     if damped and not damp_joints(world, state):
         return False
-    if touches:
-        rest_implicitly(world, state, world.switches.friction)
+    if touches or world.switches.joint_friction:
+        rest_implicitly(world, state, touches, touches and world.switches.friction)
         for k in range(state.v.shape[0] if damped else 0):
             state.acceleration[k] = -world.joint_damping[k] * state.v[k]
     if damped:
@@ -246,7 +247,9 @@ def swing(world, state, h):
             )
             if free.base[t] > 0 and m.kind[free.root[t]] != SPHERICAL:
                 center, mass = center_of(m, state.body, world.tree_of_body, t)
-                path = scale(h / mass if mass > 0.0 else 0.0, linear_momentum(m, free, t, p))
+                path = scale(
+                    h / mass if mass > 0.0 else 0.0, linear_momentum(m, free, state.body, t, p)
+                )
                 p[6], p[7], p[8] = add(center, path)
     for b in range(m.kind.shape[0]):
         if free.kind[world.tree_of_body[b]] == LINKAGE:
@@ -296,8 +299,8 @@ def swing(world, state, h):
 
 @kernel
 def falls(world, state, applied, t):
-    """Return whether tree t is free of contact and, with implicit contact, of the hand and the
-    coupling.
+    """Return whether tree t is free of contact and joint friction and, with implicit contact, of
+    the hand and the coupling.
 
     Only where gravity acts alone is it split in halves: a force that holds a weight would move it
     by half a step.
@@ -307,7 +310,7 @@ def falls(world, state, applied, t):
         world.tree_start[t], world.tree_stop[t] if world.switches.implicit_contact else 0
     ):
         alone = alone and applied[k] == 0.0
-    return alone
+    return alone and not (world.switches.joint_friction and is_dry(world, t))
 
 
 @kernel

@@ -37,6 +37,7 @@ class Switches(NamedTuple):
     spreading: bool
     contacts: bool
     joint_damping: bool
+    joint_friction: bool
     joint_limits: bool
 
 
@@ -83,6 +84,7 @@ class World(NamedTuple):
     coherence_distance: float  # [m]
     per_body_rows: bool  # (13)-(14) instead of (12)
     joint_damping: np.ndarray  # (d,) viscous [N s/m, N m s/rad]
+    joint_friction: np.ndarray  # (d,) Coulomb's [N, N m]
     stops: Stops
     impulse_limit: np.ndarray  # (d,) largest |Jᵀp/Δt| the device can render [N, N m], inf = none
     conserving: bool  # free motion keeps momentum (`iapb.mechanics.kernels.free_motion`)

@@ -11,12 +11,16 @@ from iapb.schema import Booleans, Floats, Integers, zeros_of
 
 
 class MechanismArrays(NamedTuple):
-    """A mechanism as contiguous arrays; n bodies, d velocities. Parents come before children."""
+    """A mechanism as contiguous arrays; n bodies. Parents come before children.
+
+    There are m motions: first the d velocities, then one for each joint that follows another one,
+    with rate and position `dof_ratio` times the leader's, plus `dof_offset`.
+    """
 
     kind: Integers  # (n,) joint code
     parent: Integers  # (n,) body that carries this one, -1 = the world
     q_start: Integers  # (n,) first entry of the joint in q
-    v_start: Integers  # (n,) first entry of the joint in v
+    v_start: Integers  # (n,) first motion of the joint: its first entry in v
     v_count: Integers  # (n,) number of entries in v
     joint_axis: Floats  # (n, 3) unit, joint frame
     placement_rotation: Floats  # (n, 3, 3) joint frame in the parent body's frame
@@ -25,9 +29,12 @@ class MechanismArrays(NamedTuple):
     center_of_mass: Floats  # (n, 3) [m] body frame
     inertia: Floats  # (n, 3, 3) [kg m^2] about the centre of mass, body axes
     last_dof: Integers  # (n,) last dof on the path from the world to the body, -1 = none
-    dof_body: Integers  # (d,) body that the dof moves
-    dof_parent: Integers  # (d,) dof before it on the path from the world, -1 = none
-    dof_rotates: Booleans  # (d,) turns about its axis; otherwise moves along it
+    dof_body: Integers  # (m,) body that the dof moves
+    dof_parent: Integers  # (m,) dof before it on the path from the world, -1 = none
+    dof_rotates: Booleans  # (m,) turns about its axis; otherwise moves along it
+    dof_leader: Integers  # (m,) the velocity that it follows, its own or another one
+    dof_ratio: Floats  # (m,) 1 for its own
+    dof_offset: Floats  # (m,)
     quaternions: bool  # whether a joint has one
 
 

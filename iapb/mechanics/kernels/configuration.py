@@ -76,6 +76,13 @@ def is_vector(kind):
 
 
 @kernel
+def own_count(m, b):
+    """Return the number of a joint's own velocities: none if it follows another joint."""
+    k, count = m.v_start[b], m.v_count[b]
+    return count if count == 0 or m.dof_leader[k] == k else 0
+
+
+@kernel
 def integrate_body(m, b, q, v, dt, out):
     """Coordinates of body b in out (nq,) <- those in q moved for dt with the constant velocity
     v."""
@@ -88,7 +95,7 @@ def integrate_body(m, b, q, v, dt, out):
     elif kind in (SPHERICAL, FREE_FLYER):
         integrate_in_space(m, b, q, v, dt, out)
     else:
-        for j in range(m.v_count[b]):
+        for j in range(own_count(m, b)):
             out[i + j] = q[i + j] + dt * v[k + j]
 
 
@@ -153,5 +160,5 @@ def difference(m, q0, q1, out):
         elif kind in (SPHERICAL, FREE_FLYER):
             difference_in_space(m, b, q0, q1, out)
         else:
-            for j in range(m.v_count[b]):
+            for j in range(own_count(m, b)):
                 out[k + j] = q1[i + j] - q0[i + j]

@@ -82,6 +82,7 @@ def mass_matrix(m, w, out):
     """
     composite_bodies(m, w)
     out[:] = 0.0
+    alone = m.dof_body.shape[0] == out.shape[0]
     for j in range(m.dof_body.shape[0]):
         b = m.dof_body[j]
         a, c = load(w.axis, j), load(w.composite_center, b)
@@ -98,9 +99,22 @@ def mass_matrix(m, w, out):
                 entry = dot(load(w.axis, i), add(angular, cross(lever, linear)))
             else:
                 entry = dot(load(w.axis, i), linear)
-            out[i, j] = entry
-            out[j, i] = entry
+            if alone:
+                out[i, j] = entry
+                out[j, i] = entry
+            else:
+                add_to_leaders(m, i, j, entry, out)
             i = m.dof_parent[i]
+
+
+@kernel
+def add_to_leaders(m, i, j, entry, out):
+    """Add an entry of two motions to that of the velocities which they follow: Gᵀ M G."""
+    k, l = m.dof_leader[i], m.dof_leader[j]
+    share = m.dof_ratio[i] * m.dof_ratio[j] * entry
+    out[k, l] += share
+    if i != j:
+        out[l, k] += share
 
 
 @kernel
@@ -122,12 +136,17 @@ def project_forces(m, w, out):
     for b in range(m.kind.shape[0] - 1, -1, -1):
         f, n = load(w.force, b), load(w.moment, b)
         for k in range(m.v_start[b], m.v_start[b] + m.v_count[b]):
-            out[k] = dot(load(w.axis, k), n if m.dof_rotates[k] else f)
+            if m.dof_leader[k] == k:
+                out[k] = dot(load(w.axis, k), n if m.dof_rotates[k] else f)
         parent = m.parent[b]
         if parent >= 0:
             lever = subtract(load(w.position, b), load(w.position, parent))
             accumulate(w.force, parent, f)
             accumulate(w.moment, parent, add(n, cross(lever, f)))
+    for k in range(out.shape[0], m.dof_body.shape[0]):
+        total = w.moment if m.dof_rotates[k] else w.force
+        share = dot(load(w.axis, k), load(total, m.dof_body[k]))
+        out[m.dof_leader[k]] += m.dof_ratio[k] * share
 
 
 @kernel
@@ -136,10 +155,11 @@ def relative_motion(m, w, b, rates):
     its dofs."""
     linear, angular = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for k in range(m.v_start[b], m.v_start[b] + m.v_count[b]):
+        rate = m.dof_ratio[k] * rates[m.dof_leader[k]]
         if m.dof_rotates[k]:
-            angular = add(angular, scale(rates[k], load(w.axis, k)))
+            angular = add(angular, scale(rate, load(w.axis, k)))
         else:
-            linear = add(linear, scale(rates[k], load(w.axis, k)))
+            linear = add(linear, scale(rate, load(w.axis, k)))
     return linear, angular
 
 

@@ -9,7 +9,7 @@ from iapb.compiled import kernel
 from iapb.elementary import arc_tangent
 from iapb.linalg import add, all_finite, cholesky, cross, dot, load, scale, solve_mass, subtract
 from iapb.mechanics.joints import FREE_FLYER
-from iapb.mechanics.kernels.configuration import difference, is_vector, turn_vector
+from iapb.mechanics.kernels.configuration import difference, is_vector, own_count, turn_vector
 from iapb.mechanics.kernels.dynamics import bias, body_velocities, mass_matrix, turned_inertia
 from iapb.mechanics.kernels.kinematics import add_point_force, forward_kinematics
 
@@ -23,7 +23,9 @@ def misplaced_body(m, q):
     one; −1: none."""
     for b in range(m.kind.shape[0]):
         first = m.q_start[b]
-        stop = m.q_start[b + 1] if b + 1 < m.kind.shape[0] else q.shape[0]
+        stop = first + own_count(m, b)
+        if not is_vector(m.kind[b]):
+            stop += 1  # one entry more than velocities
         square = 0.0
         for i in range(first + 3 if m.kind[b] == FREE_FLYER else first, stop):
             square += q[i] * q[i]

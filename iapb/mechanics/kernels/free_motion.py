@@ -145,6 +145,9 @@ def parts_of_linkages(m, free, start, stop, v, dt):
             for k in range(start[t], stop[t]):
                 if m.dof_rotates[k]:
                     fastest = max(fastest, abs(v[k]))
+    for k in range(v.shape[0], m.dof_body.shape[0]):
+        if m.dof_rotates[k]:
+            fastest = max(fastest, abs(m.dof_ratio[k] * v[m.dof_leader[k]]))
     return max(1, min(MOST_PARTS, ceil(dt * fastest / LINKAGE_ANGLE)))
 
 
@@ -192,12 +195,15 @@ def to_fixed_axes(m, free, w, q, t, p, way):
 
 
 @kernel
-def linear_momentum(m, free, t, p):
+def linear_momentum(m, free, w, t, p):
     """Return the linear momentum [N s], in world axes, of a root's momentum in fixed axes; zero if
     it cannot move."""
     if free.base[t] == 0 or m.kind[free.root[t]] == SPHERICAL:
         return (0.0, 0.0, 0.0)
-    return (p[0], p[1], 0.0 if m.kind[free.root[t]] == PLANAR else p[2])
+    if m.kind[free.root[t]] == PLANAR:
+        k = m.v_start[free.root[t]]
+        return add(scale(p[0], load(w.axis, k)), scale(p[1], load(w.axis, k + 1)))
+    return (p[0], p[1], p[2])
 
 
 @kernel

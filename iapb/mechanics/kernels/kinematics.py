@@ -39,6 +39,13 @@ def body_axes_to_dofs(w, b, first):
 
 
 @kernel
+def joint_position(m, q, b):
+    """Return the position of a revolute or prismatic joint, its own or what it follows."""
+    k, x = m.v_start[b], q[m.q_start[b]]
+    return x if m.dof_leader[k] == k else m.dof_ratio[k] * x + m.dof_offset[k]
+
+
+@kernel
 def move_joint(m, q, w, b):
     """Move body b from its joint frame to its pose; write the axes of the joint's dofs."""
     kind, i, k = m.kind[b], m.q_start[b], m.v_start[b]
@@ -51,11 +58,13 @@ def move_joint(m, q, w, b):
         turn_about_axis(w, b, (0.0, 0.0, 1.0), c, s)
     elif kind == PRISMATIC:
         store(w.axis, k, transform(w.rotation, b, load(m.joint_axis, b)))
-        store(w.position, b, add(load(w.position, b), scale(q[i], load(w.axis, k))))
+        store(
+            w.position, b, add(load(w.position, b), scale(joint_position(m, q, b), load(w.axis, k)))
+        )
     elif kind in (REVOLUTE, CONTINUOUS):
         a = load(m.joint_axis, b)
         store(w.axis, k, transform(w.rotation, b, a))
-        s, c = sine_cosine(q[i]) if kind == REVOLUTE else (q[i + 1], q[i])
+        s, c = sine_cosine(joint_position(m, q, b)) if kind == REVOLUTE else (q[i + 1], q[i])
         turn_about_axis(w, b, a, c, s)
     elif kind != FIXED:  # a unit quaternion, after the position of a free flyer
         if kind == FREE_FLYER:
@@ -119,7 +128,7 @@ def forward_kinematics(m, q, w):
 @kernel
 def motion_at(m, w, k, x):
     """Return the velocity of the point x per unit velocity of dof k."""
-    a = load(w.axis, k)
+    a = scale(m.dof_ratio[k], load(w.axis, k))
     return cross(a, subtract(x, load(w.position, m.dof_body[k]))) if m.dof_rotates[k] else a
 
 
@@ -130,9 +139,12 @@ def frame_jacobian(m, w, body, point, out):
     out[:] = 0.0
     k = m.last_dof[body]
     while k >= 0:
-        out[0, k], out[1, k], out[2, k] = motion_at(m, w, k, (point[0], point[1], point[2]))
+        column = out[:, m.dof_leader[k]]
+        x, y, z = motion_at(m, w, k, (point[0], point[1], point[2]))
+        column[0], column[1], column[2] = column[0] + x, column[1] + y, column[2] + z
         if m.dof_rotates[k]:
-            out[3, k], out[4, k], out[5, k] = load(w.axis, k)
+            x, y, z = scale(m.dof_ratio[k], load(w.axis, k))
+            column[3], column[4], column[5] = column[3] + x, column[4] + y, column[5] + z
         k = m.dof_parent[k]
 
 
@@ -149,5 +161,5 @@ def add_point_force(m, w, body, point, force, out):
     k = m.last_dof[body]
     while k >= 0:
         x, y, z = motion_at(m, w, k, place)
-        out[k] += x * force[0] + y * force[1] + z * force[2]
+        out[m.dof_leader[k]] += x * force[0] + y * force[1] + z * force[2]
         k = m.dof_parent[k]

@@ -50,6 +50,12 @@ SWITCHES: dict[str, tuple[Scene, dict[str, Any], dict[str, Any], str]] = {
         {"bodies.upper.joint_damping": 0.0},
         "upper [0.25]",
     ),
+    "joint_friction": (
+        PENDULUM,
+        {"bodies.upper.joint_friction": 0.25},
+        {"bodies.upper.joint_friction": 0.0},
+        "upper [0.25] N, N m",
+    ),
     "joint_limits": (PENDULUM, {"bodies.lower.joint_limits": [-3, 3]}, {}, "lower [-3, 3] rad, m"),
     "wall_contacts": (PEG, {}, {"walls": []}, "2 pairs"),
     "body_contacts": (DISCS, {}, {"bodies.striker.shapes": []}, "1 pair"),

@@ -104,6 +104,7 @@ CASES = {
     "pendulum": ("double_pendulum", {}, IAPB, "none"),
     "one link": ("double_pendulum", ONE_LINK, IAPB, "none"),
     "damped": ("double_pendulum", {"bodies.upper.joint_damping": 0.1}, IAPB, "none"),
+    "dry": ("double_pendulum", {"bodies.upper.joint_friction": 0.1}, IAPB, "none"),
     "limited": ("double_pendulum", {"bodies.upper.joint_limits": [-0.01, 4.0]}, IAPB, "none"),
     "implicit": peg(law=IAPB, contact__forces="implicit"),
     "arm with device": ("arm_pushing", {}, IAPB, "four-channel"),
@@ -126,6 +127,7 @@ ONLY = {
     "quantisation": "sense",
     "hand_force": "press",
     "joint_damping": "damp_joints",
+    "joint_friction": "is_dry",
     "joint_limits": "add_stops",
     "varying_inertia": "mass_matrix cholesky_tree_blocks",
     "velocity_terms": "bias",
@@ -152,6 +154,8 @@ def test_code_of_an_effect_runs_only_where_the_effect_is_on(effect, found):
     on = {case for case in CASES if effect in found[case]["on"]}
     if effect == "wall_contacts":  # a joint at its limit is a contact as well
         on |= {case for case in CASES if "joint_limits" in found[case]["on"]}
+    if effect == "implicit_contact":  # friction of joints is solved with contacts
+        on |= {case for case in CASES if "joint_friction" in found[case]["on"]}
     if effect == "unequal_restitution":  # contacts that carry a load only push, too
         on |= {case for case in CASES if "supports" in found[case]["on"]}
     for name in ONLY[effect].split():

@@ -76,15 +76,6 @@ def test_a_floating_base_moves_freely(read):
     assert (floating.nq, floating.nv, floating.bodies[1].mass) == (7, 6, 0.0)
 
 
-def test_mimic_joints_are_independent(read):
-    links = [link("base"), link("a"), link("b")]
-    joints = [
-        joint("j", "base", "a"),
-        joint("k", "base", "b", inside='<mimic joint="j" multiplier="2"/>'),
-    ]
-    assert read(*links, *joints).nv == 2
-
-
 def test_a_chain_of_thousands_of_links_is_read(read):
     n = 3000
     links = [link(f"l{i}", "") for i in range(n)]

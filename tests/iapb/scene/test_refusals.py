@@ -74,6 +74,18 @@ IN_THE_PLANE: dict[str, list[Any]] = {
     "bodies.puck.density": [value for value in NOT_POSITIVE if value is not None],
     "bodies.slide.density": [1.0],  # no shapes
     "bodies.arm.joint_damping": [*(x for x in NEGATIVE if x != [1]), [1.0, 1.0], [-1.0]],
+    "bodies.arm.joint_friction": [*(x for x in NEGATIVE if x != [1]), [1.0, 1.0], [-1.0]],
+    "bodies.arm.joint_mimic": [
+        3,
+        {},
+        {"body": "nobody"},
+        {"body": "arm"},
+        {"body": "base"},
+        {"body": "slide", "multiplier": "x"},
+        {"body": "slide", "offset": math.inf},
+        {"body": "slide", "factor": 2.0},
+    ],
+    "bodies.puck.joint_mimic": [{"body": "slide"}],
     "bodies.puck.joint_damping": [1.0, [1.0, 1.0], [1.0, 1.0, -1.0]],
     "bodies.arm.joint_limits": [
         1.0,

@@ -174,6 +174,66 @@ def test_damping_is_that_of_the_same_scene_in_yaml(load: Load) -> None:
     assert np.array_equal(run.q, simulate(plain).q)
 
 
+# mimic and friction
+
+
+def follower(mimic: str, inside: str = RANGE, kind: str = "prismatic") -> str:
+    return joint("follow", "thumb", kind, f"{inside}<mimic {mimic}/>")
+
+
+THUMB = link("thumb")
+
+
+def test_a_gripper_closes_as_one(load: Load) -> None:
+    """The second finger follows the first; its weight holds the other one's, and its limit stops it."""
+    scene = load(PALM, FINGER, THUMB, SLIDE, follower('joint="slide" multiplier="-1"'))
+    assert mechanism_of(scene).nv == 1 and scene.bodies[1].position == ()
+    assert np.abs(simulate(scene).q).max() < 1e-12
+    heavy = scene.with_values({"bodies.r_thumb.mass": 0.5})  # it falls, and lifts the first one
+    run = simulate(heavy)
+    assert run.q[-1, 0] == pytest.approx(0.02, abs=1e-4) and not run.distrust
+
+
+@pytest.mark.parametrize(
+    ("mimic", "kind"),
+    [
+        ('joint="none"', "prismatic"),
+        ('joint="follow"', "prismatic"),
+        ('joint="turn"', "prismatic"),
+        ('joint="slide"', "floating"),
+    ],
+)
+def test_what_no_joint_can_follow_is_refused_and_can_be_left_out(
+    load: Load, mimic: str, kind: str
+) -> None:
+    turn = joint("turn", "wheel", "continuous")
+    parts = PALM, FINGER, THUMB, link("wheel"), SLIDE, turn, follower(mimic, "", kind)
+    assert "leave_out: {follow: [mimic]}" in refusal(load, *parts)
+    thumb = load(*parts, more="leave_out: {follow: [mimic]}").bodies[1]
+    assert thumb.name == "r_thumb" and thumb.joint_mimic is None
+
+
+def test_a_start_follows_the_leader_and_stays_within_both_ranges(load: Load) -> None:
+    parts = PALM, FINGER, THUMB, SLIDE
+    scene = load(*parts, follower('joint="slide" offset="-0.05"'))
+    assert start_of(scene)[0] == pytest.approx(0.03)
+    assert "position" in refusal(
+        load, *parts, follower('joint="slide"'), more="position: {thumb: [0]}"
+    )
+    assert "range in common" in refusal(load, *parts, follower('joint="slide" offset="1"'))
+    with pytest.raises(ArgumentError, match="of what follows it"):
+        simulate(scene.with_values({"bodies.r_thumb.joint_mimic.offset": 0.1}))
+
+
+def test_friction_of_a_joint_holds_a_light_finger(load: Load) -> None:
+    slide = joint("slide", "finger", inside='<dynamics friction="1"/>')
+    scene = load(PALM, FINGER, slide)
+    assert scene.bodies[1].joint_friction == (1.0,)
+    assert np.abs(simulate(scene).q).max() < 1e-9
+    left = load(PALM, FINGER, slide, more="leave_out: {slide: [dynamics]}")
+    assert simulate(left).q.min() < -1.0
+
+
 # what is ignored is said, once
 
 

@@ -1,0 +1,104 @@
+"""Joints that follow others have no coordinates: M = Gᵀ M_full G, and so on, as in Pinocchio."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from iapb.errors import ArgumentError
+from iapb.mechanics.bodies import Body
+from iapb.mechanics.joints import Joint, Mimic, ranges_of
+from iapb.mechanics.mechanism import Mechanism
+from iapb.mechanics.urdf import read_urdf
+from reference.rigid_body import model_from_urdf, model_of
+from verification.mechanics.against_pinocchio import AGREEMENT, compare
+
+INERTIA = np.diag([0.1, 0.2, 0.25])
+AT = (np.eye(3), np.array([0.3, 0.1, -0.2]))
+
+
+def link(name: str, parent: str | None, kind: str, axis: tuple[float, ...], mimic=None) -> Body:
+    return Body(name, parent, Joint(kind, axis), AT, 1.5, [0.1, -0.2, 0.3], INERTIA, mimic)
+
+
+def tree(*mimics: Mimic | None) -> Mechanism:
+    """A free base with two branches; all but the base may follow another joint."""
+    return Mechanism([
+        link("base", None, "free_flyer", (0, 0, 1)),
+        link("a", "base", "revolute", (0, 1, 0), mimics[0]),
+        link("b", "a", "prismatic", (1, 1, 0), mimics[1]),
+        link("c", "b", "revolute", (1, 0, 0), mimics[2]),
+        link("d", "base", "revolute", (0, 1, 1), mimics[3]),
+        link("e", "d", "spherical", (0, 0, 1)),
+    ])  # fmt: skip
+
+
+FOLLOWED = {
+    "along a chain": (None, Mimic("a", -0.5, 0.2), Mimic("a", 2.0), None),
+    "another branch": (None, None, None, Mimic("c", 3.0, 0.1)),
+    "a later joint": (Mimic("d", 0.7), None, None, None),
+    "prismatic leader": (Mimic("b", 2.0, -0.3), None, Mimic("b", -1.0), Mimic("b")),
+    "multiplier zero": (None, None, Mimic("a", 0.0, 0.4), None),
+}
+
+
+@pytest.mark.parametrize("mimics", FOLLOWED.values(), ids=FOLLOWED)
+def test_all_quantities_agree_with_pinocchio(mimics: tuple[Mimic | None, ...]) -> None:
+    mechanism, rng = tree(*mimics), np.random.default_rng(0)
+    followers = sum(mimic is not None for mimic in mimics)
+    assert (mechanism.nq, mechanism.nv) == (15 - followers, 13 - followers)
+    assert len(mechanism.coordinate_names) == mechanism.nq == len(mechanism.neutral())
+    for _ in range(3):
+        q = mechanism.integrate(mechanism.neutral(), rng.normal(size=mechanism.nv))
+        v = rng.normal(size=mechanism.nv)
+        found = compare(mechanism, model_of(mechanism), q, v)
+        assert max(found.values()) < AGREEMENT
+        back = mechanism.difference(mechanism.neutral(), q)
+        np.testing.assert_allclose(mechanism.integrate(mechanism.neutral(), back), q, atol=1e-12)
+
+
+def test_a_urdf_is_read_as_pinocchio_reads_it_with_mimic(tmp_path: Path) -> None:
+    inertial = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
+    links = "".join(f'<link name="{name}">{inertial}</link>' for name in "pabc")
+    path = tmp_path / "r.urdf"
+    path.write_text(
+        f'<robot name="r">{links}'
+        '<joint name="k" type="revolute"><parent link="p"/><child link="a"/><axis xyz="0 1 0"/>'
+        '<limit lower="-1" upper="2" effort="1" velocity="1"/><origin xyz="1 0 0"/></joint>'
+        '<joint name="l" type="prismatic"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>'
+        '<limit lower="-1" upper="2" effort="1" velocity="1"/><mimic joint="k" multiplier="-2" '
+        'offset="0.1"/></joint><joint name="m" type="revolute"><parent link="p"/>'
+        '<child link="c"/><axis xyz="0 0 1"/><mimic joint="k"/>'
+        '<limit lower="-1" upper="2" effort="1" velocity="1"/></joint></robot>'
+    )
+    mechanism, theirs = Mechanism.from_urdf(path), model_from_urdf(path)
+    assert mechanism.nv == theirs.nv == 1
+    assert read_urdf(path)[2].mimic == Mimic("a", -2.0, 0.1)
+    assert max(compare(mechanism, theirs, np.array([0.4]), np.array([1.3])).values()) < AGREEMENT
+
+
+def test_energy_of_free_motion_stays_where_joints_follow() -> None:
+    """The kernels' B and M belong together: v·(dM/dt v)/2 = v·B of a scene without forces."""
+    mechanism, rng, h = tree(*FOLLOWED["along a chain"]), np.random.default_rng(1), 1e-6
+    q = mechanism.integrate(mechanism.neutral(), rng.normal(size=mechanism.nv))
+    v = rng.normal(size=mechanism.nv)
+    rate = (
+        mechanism.mass_matrix(mechanism.integrate(q, v, h))
+        - mechanism.mass_matrix(mechanism.integrate(q, v, -h))
+    ) / (2.0 * h)
+    assert 0.5 * v @ rate @ v == pytest.approx(v @ mechanism.bias(q, v), rel=1e-6)
+
+
+def test_limits_of_what_follows_bound_the_leader() -> None:
+    follow = Mimic("a", -2.0, 1.0)
+    assert ranges_of([("a", (-1.0, 1.0), None), ("b", (0.0, 2.0), follow)])["a"] == (-0.5, 0.5)
+    assert ranges_of([("b", (0.0, 2.0), follow), ("a", None, None)])["a"] == (-0.5, 0.5)
+    assert ranges_of([("a", None, None), ("b", None, follow)]) == {"a": None}
+
+
+@pytest.mark.parametrize("leader", ["base", "e", "b", "nobody"])
+def test_a_leader_without_one_coordinate_is_refused(leader: str) -> None:
+    with pytest.raises(ArgumentError, match="mimic"):
+        tree(None, Mimic("a"), Mimic(leader), None)
