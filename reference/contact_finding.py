@@ -32,6 +32,9 @@ TIE = 1e-14
 # less than faces do; edges with a smaller sine between them count as parallel; at most four points
 # of a patch are kept.
 EDGE_SHARE, PARALLEL, MOST_POINTS = 0.05, 1e-6, 4
+# Shapes that are apart graze if they just reach a face's plane, up to this share of the size: they
+# slide or roll past each other, as over a seam of two tiles. Far above rounding.
+GRAZE = 1e-9
 FACE_SHARE, FACES_COSINE = (
     1e-4,
     0.9999,
@@ -223,9 +226,10 @@ def _balls(x, radius_x, y, radius_y, otherwise, margin, ids, values, n):  # type
 @numba.njit(cache=True, fastmath=False)
 def _ball_on(nearest, middle, radius, sign, margin, ids, values, n):  # type: ignore[no-untyped-def]
     """Write the contact of a circle or ball with a polygon or box; sign −1 if the ball is b."""
-    normal, distance, feature = nearest
+    normal, distance, feature, heights = nearest
     gap = distance - radius
-    if gap > margin:
+    grazes = np.abs(heights - radius).min() <= GRAZE * radius
+    if gap > margin or (grazes and gap > GRAZE * radius):
         return n
     return _store(
         ids, values, n, feature, middle - (radius + 0.5 * gap) * normal, sign * normal, gap
@@ -245,19 +249,18 @@ def _edges(polygon):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, fastmath=False)
 def _nearest_on_polygon(polygon, x):  # type: ignore[no-untyped-def]
-    """Return direction from the polygon to a point, signed distance and feature; inside, those of
-    the nearest edge."""
+    """Return direction from the polygon to a point, signed distance, feature, and heights over all
+    edges; inside, those of the nearest edge."""
     normals, lengths = _edges(polygon)
-    inner, edge = -np.inf, 0
+    heights = np.empty(len(polygon))
     for i in range(len(polygon)):
-        height = np.sum((x - polygon[i]) * normals[i])
-        if height > inner:
-            inner, edge = height, i
-    if inner <= 0.0:
-        return normals[edge], inner, _feature(1, 0, edge)
+        heights[i] = np.sum((x - polygon[i]) * normals[i])
+    edge = np.argmax(heights)
+    if heights[edge] <= 0.0:
+        return normals[edge], heights[edge], _feature(1, 0, edge), heights
     best, normal, feature = np.inf, normals[edge], 0
     for i in range(len(polygon)):
-        from_start, height = x - polygon[i], np.sum((x - polygon[i]) * normals[i])
+        from_start, height = x - polygon[i], heights[i]
         along = -normals[i, 1] * from_start[0] + normals[i, 0] * from_start[1]
         if 0.0 <= along <= lengths[i]:
             if 0.0 < height < best:
@@ -266,7 +269,7 @@ def _nearest_on_polygon(polygon, x):  # type: ignore[no-untyped-def]
             distance = np.sqrt(np.sum(from_start * from_start))
             if distance < best:
                 best, normal, feature = distance, from_start / distance, _feature(2, i, 0)
-    return normal, best, feature
+    return normal, best, feature, heights
 
 
 @numba.njit(cache=True, fastmath=False)
@@ -280,21 +283,22 @@ def _along(axes, x):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, fastmath=False)
 def _nearest_on_box(center, axes, half, x):  # type: ignore[no-untyped-def]
-    """Return direction from the box to a point, signed distance and feature; inside, those of the
-    nearest face."""
+    """Return direction from the box to a point, signed distance, feature, and heights over the
+    faces; inside, those of the nearest face."""
     local = _along(axes, x - center)
     beyond = np.abs(local) - half
     if beyond.max() <= 0.0:
         face = int(np.argmax(beyond))
         sign = 1.0 if local[face] >= 0.0 else -1.0
-        return sign * axes[:, face].copy(), beyond[face], _feature(1, face, int(sign > 0.0))
+        feature = _feature(1, face, int(sign > 0.0))
+        return sign * axes[:, face].copy(), beyond[face], feature, beyond
     out, region = np.zeros(3), 0
     for k in range(3):
         if beyond[k] > 0.0:
             out += np.sign(local[k]) * beyond[k] * axes[:, k]
             region += (1 if local[k] > 0.0 else 2) * 3**k
     distance = np.sqrt(np.sum(out * out))
-    return out / distance, distance, _feature(2, region, 0)
+    return out / distance, distance, _feature(2, region, 0), beyond
 
 
 @numba.njit(cache=True, fastmath=False)
@@ -334,6 +338,10 @@ def _polygons(a, b, margin, ids, values, n):  # type: ignore[no-untyped-def]
     (over_a, edge_a), (over_b, edge_b) = _best_edge(a, normals_a, b), _best_edge(b, normals_b, a)
     if max(over_a, over_b) > margin:
         return n
+    if max(over_a, over_b) > GRAZE * size and (
+        _grazes(a, normals_a, b, size) or _grazes(b, normals_b, a, size)
+    ):
+        return n
     if over_a > over_b + TIE * size:
         return _over_edge(
             a,
@@ -353,6 +361,18 @@ def _polygons(a, b, margin, ids, values, n):  # type: ignore[no-untyped-def]
     return _over_edge(
         b, normals_b, lengths_b, edge_b, over_b, a, normals_a, 1.0, size, margin, ids, values, n
     )
+
+
+@numba.njit(cache=True, fastmath=False)
+def _grazes(ref, normals, other, size):  # type: ignore[no-untyped-def]
+    """Return whether the other polygon just reaches one of the edges' lines."""
+    for k in range(len(ref)):
+        lowest = np.inf
+        for i in range(len(other)):
+            lowest = min(lowest, np.sum((other[i] - ref[k]) * normals[k]))
+        if abs(lowest) <= GRAZE * size:
+            return True
+    return False
 
 
 @numba.njit(cache=True, fastmath=False)
@@ -430,7 +450,7 @@ def _corners(ref, other, sign, margin, ids, values, n):  # type: ignore[no-untyp
 def _boxes(center_a, A, half_a, center_b, B, half_b, margin, ids, values, n):  # type: ignore[no-untyped-def]
     """Write contacts of two boxes: by the axis of largest separation among 15, a clipped face or
     two edges."""
-    apart, size = center_a - center_b, half_a.sum() + half_b.sum()
+    apart, size, grazes = center_a - center_b, half_a.sum() + half_b.sum(), False
     face, edge_i, edge_j, best, most, edge_best = (
         np.int64(-1),
         np.int64(0),
@@ -442,7 +462,7 @@ def _boxes(center_a, A, half_a, center_b, B, half_b, margin, ids, values, n):  #
     for k in range(6):
         m = A[:, k].copy() if k < 3 else B[:, k - 3].copy()
         separation = abs(np.sum(apart * m)) - _reach(A, half_a, m) - _reach(B, half_b, m)
-        most = max(most, separation)
+        most, grazes = max(most, separation), grazes or abs(separation) <= GRAZE * size
         parallel = 0 <= face < 3 <= k and abs(np.sum(A[:, face] * m)) > FACES_COSINE
         lead = FACE_SHARE if parallel else TIE
         if face < 0 or separation > best + lead * size:
@@ -456,7 +476,7 @@ def _boxes(center_a, A, half_a, center_b, B, half_b, margin, ids, values, n):  #
                 separation = abs(np.sum(apart * m)) - _reach(A, half_a, m) - _reach(B, half_b, m)
                 if separation > edge_best:
                     edge_i, edge_j, edge_best = i, j, separation
-    if max(most, edge_best) > margin:
+    if max(most, edge_best) > margin or (grazes and most > GRAZE * size):
         return n
     if edge_best > most + EDGE_SHARE * abs(most) + ROUNDING * size:
         return _two_edges(

@@ -13,6 +13,7 @@ from weakref import WeakKeyDictionary
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
 from iapb.mechanics.mechanism import Mechanism
 from reference import Floats
@@ -155,6 +156,15 @@ def unit_tangents(normals: Floats, spatial: bool) -> Floats:
     return np.stack([first, np.cross(normals, first)], axis=1)
 
 
+def lasting(state: Any, found: ContactRows) -> NDArray[np.bool_]:
+    """Return which contacts (c,) `state` has from the step before."""
+    names = ("shape_a", "shape_b", "feature")
+    before = int(state.contact_count[0])
+    old = {*zip(*(getattr(state.contacts, name)[:before].tolist() for name in names), strict=True)}
+    now = zip(*(getattr(found.geometry, name).tolist() for name in names), strict=True)
+    return np.array([name in old for name in now], np.bool_)
+
+
 def write_contacts(
     state: Any, found: ContactRows, blow: Floats, pushed: Floats, friction: Floats, dt: float
 ) -> None:
@@ -164,12 +174,7 @@ def write_contacts(
     friction : (c, 3) tangential impulses in world axes, recorded as forces
     """
     into, geometry, before = state.contacts, found.geometry, int(state.contact_count[0])
-    old = {
-        *zip(
-            *(getattr(into, name)[:before].tolist() for name in ("shape_a", "shape_b", "feature")),
-            strict=True,
-        )
-    }
+    new = ~lasting(state, found)
     kept = np.flatnonzero(~(found.gap > 0.0) | (blow > 0.0) | (pushed > 0.0))
     columns = {
         **geometry._asdict(),
@@ -179,8 +184,7 @@ def write_contacts(
     }
     for name, column in columns.items():
         getattr(into, name)[: len(kept)] = column[kept]
-    names = zip(geometry.shape_a[kept], geometry.shape_b[kept], geometry.feature[kept], strict=True)
-    into.is_new[: len(kept)] = [name not in old for name in names]
+    into.is_new[: len(kept)] = new[kept]
     state.contact_impulse[: len(kept)] = blow[kept]
     state.contact_count[:] = len(kept), before
 

@@ -5,7 +5,7 @@ One step of length dt from velocity v, with generalized force f and contact rows
     v_free = v + dt M⁻¹ f,   v⁺ = argmin ½|v⁺ − v_free|²_M  subject to  J v⁺ >= b,   p the
     multipliers,
 
-    b_i = −gap_i/dt         open contact (gap > 0) that may close but not penetrate
+    b_i = −gap_i/dt         open contact (gap > CLOSED) that may close but not penetrate
     (Stewart-Trinkle, Anitescu) b_i = −inf              open contact without constraint (Moreau): it
     acts only after it closes b_i = −e gamma_minus_i  closed contact that approaches (Newton); 0 in
     Poisson's step b_i = 0                 closed contact that does not approach; with
@@ -56,6 +56,9 @@ STEP_TOLERANCE = 1e-10
 # tonne gets 250 m/s from above and as much from below. Each is a sum of some dozens of products.
 STEP_ROUNDING = 100.0 * float(np.finfo(np.float64).eps)
 
+# [m] A contact with a smaller gap is closed: above the rounding of positions within a kilometre.
+CLOSED = 1e-12
+
 # Active sets cycle for some redundant rows, projections do not.
 STEP_SOLVERS = {"daqp": daqp, "quadprog": quadprog, "gauss_seidel": projected_sweeps}
 SCHEMES = ("automatic", "moreau", "stewart-trinkle")
@@ -90,7 +93,7 @@ def rigid_step(
     gap: Floats,
     gamma_minus: Floats,
     restitution: float | Floats,
-    stabilization: float = 0.0,
+    stabilization: float | Floats = 0.0,
     scheme: str = "automatic",
 ) -> RigidStep:
     """Advance v (d,) by dt [s] under generalized force f (d,) and unilateral contacts.
@@ -100,7 +103,7 @@ def rigid_step(
     contact_jacobian : (c, d) unit-normal rows; gap : (c,) [m]; gamma_minus : (c,) J v [m/s]
     restitution : e in [0, 1], one for all contacts or (c,)
     stabilization : share in [0, 1] of an overlap that this step removes (0: none, as in Moreau's
-        step)
+        step), one for all contacts or (c,)
     scheme : "moreau" ignores open contacts; "stewart-trinkle" keeps them from penetrating, with
         Poisson's law if e > 0; "automatic" treats an open contact as Stewart-Trinkle's step if its
         e = 0 and as Moreau's if e > 0
@@ -242,7 +245,7 @@ def velocity_bounds(
     gamma_minus: Floats,
     restitution: float | Floats,
     dt: float,
-    stabilization: float = 0.0,
+    stabilization: float | Floats = 0.0,
     scheme: str = "automatic",
 ) -> Floats:
     """Return b (c,) of J v⁺ >= b [m/s], for one e or e (c,); −inf marks contacts that the step
@@ -252,8 +255,8 @@ def velocity_bounds(
         raise ArgumentError(
             "restitution", restitution, "values in [0, 1], one for all or one for each contact"
         )
-    if not 0.0 <= stabilization <= 1.0:
-        raise ArgumentError("stabilization", stabilization, "a value in [0, 1]")
+    if not (0.0 <= np.min(stabilization, initial=0.0) <= np.max(stabilization, initial=0.0) <= 1.0):
+        raise ArgumentError("stabilization", stabilization, "values in [0, 1]")
     if scheme not in SCHEMES:
         raise ArgumentError("scheme", scheme, one_of(scheme, SCHEMES))
     may_close = (scheme == "stewart-trinkle") | ((scheme == "automatic") & (e == 0.0))
@@ -261,7 +264,7 @@ def velocity_bounds(
     newton = 0.0 if scheme == "stewart-trinkle" else e
     when_closed = newton * np.maximum(-gamma_minus, 0.0)
     push_out = stabilization * np.maximum(-gap, 0.0) / dt
-    return np.where(gap > 0.0, when_open, np.maximum(when_closed, push_out))
+    return np.where(gap > CLOSED, when_open, np.maximum(when_closed, push_out))
 
 
 def friction_step(

@@ -1,9 +1,14 @@
 """The contact law of the "ideal" world and of CBuc: rigid contacts at velocity level, one QP per
 step.
 
-Forces and impulses act at the start of the step, at its configuration, by `reference.rigid_step`
-(Moreau/Jean, Stewart-Trinkle/Anitescu, Poisson; dry friction). Then the mechanism moves on its own,
-by `reference.free_motion`. This module makes both a contact law that runs on every scene.
+The mechanism moves on its own for half a step, by `reference.free_motion`. There, at Moreau's
+midpoint, forces and impulses act by `reference.rigid_step` (Moreau/Jean, Stewart-Trinkle/Anitescu,
+Poisson; dry friction). Then it moves on for the other half. So smooth motion has order two, also
+with contacts that rest or slide and with joint damping. What stays of order one: the moment of an
+impact, a corner that turns where friction holds it, and scenes with a hand, in which all acts at the
+start of the step. This module makes both a contact law that runs on every scene.
+
+Contacts are found and recorded at the midpoint.
 """
 
 from __future__ import annotations
@@ -126,28 +131,30 @@ class RigidConstraints:
                 f"step; {cost.contacts:,} contacts of {cost.coordinates:,} coordinates have "
                 f"{cost.contacts * cost.coordinates:,}. Fewer bodies, or the world IAPB",
             )
-        mechanics, q, v, g = (
-            contact_rows.mechanics_of(system),
-            state.q.copy(),
-            state.v.copy(),
-            system.gravity,
-        )
+        mechanics, g = contact_rows.mechanics_of(system), system.gravity
+        before = _share_before(system, state) * dt
+        q, v = state.q.copy(), state.v.copy()
+        if before:
+            q, v = free_motion(mechanics, q, v, before)
         mass = mechanics.mass_matrix(q)
         found = contact_rows.find_rows(system, q, v, self.margin)
         # B belongs to the free motion after the forces; where it is zero, its rounding errors keep
         # their old place.
         inner = mechanics.gravity(q, g) if mechanics.has_bias else mechanics.inner_forces(q, v, g)
         force = applied_force - inner
-        # Joint damping is implicit, by M + Δt D, as in the engine's step.
+        # Joint damping is implicit, by M + θ Δt D.
         damping, approach = system.joint_damping, system.scene.contact.approach_velocity
-        damped = mass + dt * np.diag(damping)
-        struck = step = self._solve(system, damped, q, v, force - damping * v, dt, found)
+        implicit = _implicit_share(mass, damping, dt)
+        damped = mass + implicit * dt * np.diag(damping)
+        thrown = v
+        removed = _removed(state, found, dt) if before else np.zeros(len(found.gap))
+        struck = step = self._solve(system, damped, q, v, force - damping * v, dt, found, removed)
         blows = _blows(mass, found, step.normal, approach)
         lasts = ~blows
         if damping.any() and blows.any():
             # The collision comes first, with M alone: an impulse p solved with damping could gain
             # energy on M.
-            struck = self._solve(system, mass, q, v, np.zeros_like(v), dt, found)
+            struck = self._solve(system, mass, q, v, np.zeros_like(v), dt, found, removed)
             blows, lasts = (
                 _blows(mass, found, struck.normal, approach),
                 np.ones(len(blows), np.bool_),
@@ -155,7 +162,9 @@ class RigidConstraints:
             blow = (found.jacobian.T * struck.normal + struck.dragging)[:, blows].sum(axis=1)
             thrown = v + np.linalg.solve(mass, blow)
             moved = replace(found, gamma=found.jacobian @ thrown)
-            step = self._solve(system, damped, q, thrown, force - damping * thrown, dt, moved)
+            step = self._solve(
+                system, damped, q, thrown, force - damping * thrown, dt, moved, removed
+            )
         impulse = (found.jacobian.T * struck.normal + struck.dragging)[:, blows].sum(axis=1)
         pressing, dragging = (
             part[:, lasts].sum(axis=1) / dt
@@ -166,12 +175,11 @@ class RigidConstraints:
             state, found, blow, pushed, np.where(lasts[:, None], step.tangential, 0.0), dt
         )
         contact_rows.write_impact(state, system, v, mass, impulse, found.jacobian[blows])
-        q_plus, v_plus = free_motion(mechanics, q, step.velocity, dt)
+        q_plus, v_plus = free_motion(mechanics, q, step.velocity, dt - before)
         touches = ((found.gap <= 0.0) | (step.normal > 0.0)).any()
         contact_state = COLLIDING if blows.any() else RESTING if touches else FREE
-        return StepResult(
-            q_plus, v_plus, pressing, dragging - damping * step.velocity, impulse, contact_state
-        )
+        slowing = damping * (implicit * step.velocity + (1.0 - implicit) * thrown)
+        return StepResult(q_plus, v_plus, pressing, dragging - slowing, impulse, contact_state)
 
     def _solve(
         self,
@@ -182,13 +190,18 @@ class RigidConstraints:
         force: Floats,
         dt: float,
         found: contact_rows.ContactRows,
+        removed: Floats,
     ) -> _Solved:
         (classes, table), values, shapes = system.frictions, system.restitutions, found.geometry[:2]
+        scheme = self.scheme
         e: float | Floats = (
             float(values[0]) if len(values) else float(system.scene.contact.restitution)
         )
         if len(values) > 1:  # pairs that can touch differ: one e for each contact
             e = restitution_by_pair(system.scene, np.stack(shapes, axis=1))
+            # Contacts that touch together must act together, wherever in a step they do.
+            scheme = "stewart-trinkle" if scheme == "automatic" else scheme
+        removed = np.maximum(self.stabilization, np.where(np.equal(e, 0.0), removed, 0.0))
         if self.friction == "none" or not table.any():
             step = rigid_step(
                 mass,
@@ -199,8 +212,8 @@ class RigidConstraints:
                 found.gap,
                 found.gamma,
                 e,
-                self.stabilization,
-                self.scheme,
+                removed,
+                scheme,
             )
             return _Solved(
                 step.velocity,
@@ -209,7 +222,7 @@ class RigidConstraints:
                 np.zeros_like(found.jacobian.T),
             )
         mu = table[classes[shapes[0]], classes[shapes[1]]]
-        bound = velocity_bounds(found.gap, found.gamma, e, dt, self.stabilization, self.scheme)
+        bound = velocity_bounds(found.gap, found.gamma, e, dt, removed, self.scheme)
         tangents, rows = contact_rows.tangent_rows(system, q, found)
         v_free, relaxed = v + dt * np.linalg.solve(mass, force), self.friction == "relaxed"
         velocity, normal, slip = friction_step(
@@ -220,6 +233,47 @@ class RigidConstraints:
             np.einsum("csd,cs->dc", rows, slip),
         )
         return _Solved(velocity, normal, along, dragging)
+
+
+def _share_before(system: Any, state: Any) -> float:
+    """Return the share of a step in which the mechanism moves before forces and contacts act.
+
+    It is a half, Moreau's midpoint, which makes smooth motion of order two. It is 0 with a hand,
+    whose force and coupling are those at the start of the step: later, they would feed energy into
+    the motion. It is 0, too, at the start of a motion in which closed contacts approach.
+    """
+    if system.tool_tree >= 0:
+        return 0.0
+    if np.array_equal(state.q, system.start[0]):
+        found = contact_rows.find_rows(system, state.q, state.v, 0.0)
+        if (found.gamma < -system.scene.contact.approach_velocity).any():
+            return 0.0
+    return 0.5
+
+
+def _removed(state: Any, found: contact_rows.ContactRows, dt: float) -> Floats:
+    """Return the share (c,) of each overlap that a step removes: that of its own last motion.
+
+    A contact that lasts is kept at its velocity, so the way to the next midpoint ends in an overlap
+    of second order. The contact approaches by this motion, and the step takes it back; otherwise
+    overlaps add up. An overlap at the start stays.
+    """
+    back = np.maximum(np.minimum(-found.gap, -found.gamma * dt), 0.0)
+    back *= contact_rows.lasting(state, found)
+    return np.divide(back, -found.gap, out=np.zeros(len(back)), where=back > 0.0)
+
+
+def _implicit_share(mass: Floats, damping: Floats, dt: float) -> float:
+    """Return θ of a step with joint damping D (d,), at which (1 − θ) v + θ v⁺ is damped.
+
+    A half has order two; more where Δt M⁻¹ D > 2, so that no velocity changes its sign.
+    """
+    if not damping.any():
+        return 1.0
+    root = np.linalg.cholesky(mass)
+    scaled = np.linalg.solve(root, np.diag(np.sqrt(damping)))
+    fastest = dt * float(np.linalg.norm(scaled, 2)) ** 2
+    return max(0.5, 1.0 - 1.0 / fastest)
 
 
 class Cost(NamedTuple):

@@ -18,7 +18,16 @@ from tests.ordinary.scenes import CASES, Case, Motion
 LAWS = {
     "IAPB": [*CASES],
     "PB": ["ball_rolls", "tower_5", "ratio_1e6", "arch", "peg_jams", "ladder_slips"],
-    "ideal-friction": ["bounce_50_percent", "ladder_stands"],
+    "ideal": ["double_pendulum", "slider_on_a_turning_arm", "box_meets_a_seam_exactly"],
+    "ideal-friction": [
+        "bounce_50_percent",
+        "ladder_stands",
+        "disc_over_tiles",
+        "box_over_tiles_0_percent",
+        "box_over_tiles_50_percent",
+        "box_over_tiles_in_space",
+        "box_pushed_over_a_seam",
+    ],
 }
 TOO_FAST = (
     "fast_box_and_plate",

@@ -464,3 +464,90 @@ def test_an_incomplete_run_is_handed_on_only_to_who_asks_for_it() -> None:
         require_complete(replace(run, stopped="too fast"))
     whole = replace(run, complete=True, stopped="")
     assert require_complete(whole) is whole
+
+
+# --- order of the rigid worlds
+# ------------------------------------------------------------------------------------
+PENDULUM: dict[str, Any] = {
+    "joint": "revolute",
+    "inertia": 0.02,
+    "center_of_mass": [0.3, 0.0],
+    "velocity": [1.0],
+}
+EDGE: dict[str, Any] = {  # a box that stands on its edge, and falls
+    "inertia": 2e-3,
+    "shapes": [{"kind": "box", "size": [0.1, 0.1]}],
+    "position": [0.0, 0.05 * (np.sin(0.6) + np.cos(0.6)), 0.6],
+}
+
+
+@pytest.mark.parametrize(
+    ("body", "options", "least"),
+    [
+        (PENDULUM, {}, 3.9),
+        (PENDULUM | {"joint_damping": 0.5}, {}, 3.9),
+        (EDGE, {"floor": 0.0}, 3.5),
+    ],
+    ids=["pendulum", "damped", "slides"],
+)
+def test_smooth_motion_is_of_order_two(body: Any, options: Any, least: float) -> None:
+    """Half the step leaves a quarter of the change that the step before left."""
+    ends = []
+    for rate in (500.0, 1000.0, 2000.0):
+        scene = scene_of(body, space=False, gravity=9.81, duration=0.1, rate=rate, **options)
+        ends.append(run_world(scene, "ideal-friction").q[-1])
+    apart = np.abs(np.diff(ends, axis=0)).max(axis=1)
+    assert apart[0] > least * apart[1]
+
+
+def test_a_scene_with_a_hand_keeps_its_step_and_a_blow_at_the_start_its_place() -> None:
+    falls = {"inertia": 1.0, "velocity": [0, -1, 0], "position": [0, 0.1, 0]}
+    disc = falls | {"shapes": [{"kind": "circle", "radius": 0.1}]}
+    scene = scene_of(disc, space=False, gravity=0.0, floor=0.0, contact={"restitution": 0})
+    assert not run_world(scene, "ideal", steps=3).q[:, 1].max() > 0.1
+    free = scene_of(falls, space=False, gravity=9.81, duration=0.1)
+    held = scene_of(falls, space=False, gravity=9.81, duration=0.1, hand={"body": "body_0"})
+    ways = [run_world(one, "ideal").q[-1, 1] for one in (free, held)]
+    exact = 0.1 - 0.1 - 0.5 * 9.81 * 0.1**2
+    assert ways[0] == pytest.approx(exact, rel=1e-12)
+    assert ways[1] == pytest.approx(exact - 0.5 * 9.81 * 1e-3 * 0.1, rel=1e-12)
+
+
+@pytest.mark.parametrize("space", [False, True])
+@pytest.mark.parametrize("thing", ["box", "ball"])
+def test_what_lands_on_tiles_moves_as_on_one_floor(space: bool, thing: str) -> None:
+    """Thrown flat at 1.5 m/s, it crosses three seams, with the front and with all of its base."""
+    kind = {
+        ("box", False): {"kind": "box", "size": [0.1, 0.05]},
+        ("box", True): {"kind": "box", "size": [0.1, 0.08, 0.05]},
+        ("ball", False): {"kind": "circle", "radius": 0.025},
+        ("ball", True): {"kind": "sphere", "radius": 0.025},
+    }[thing, space]
+    body = {
+        "inertia": [2e-4] * 3 if space else 2e-4,
+        "shapes": [kind],
+        "position": [0.05, 0, 0.06, 0, 0, 0, 1] if space else [0.05, 0.06, 0],
+        "velocity": [1.5, 0, -1, 0, 0, 0] if space else [1.5, -1, 0],
+    }
+
+    def tile(low: float, high: float) -> dict[str, Any]:
+        across = [2.0, 0.1] if space else [0.1]
+        down = [0.0, -0.05] if space else [-0.05]
+        size = [high - low, *across]
+        return {"kind": "box", "size": size, "center": [0.5 * (low + high), *down]}
+
+    options = {"gravity": 9.81, "duration": 0.35, "contact": {"friction": 0.1}}
+    one, tiled = (
+        run_world(
+            scene_of(
+                body,
+                space=space,
+                walls=[tile(a, b) | {"name": f"tile_{k}"} for k, (a, b) in enumerate(floor)],
+                **options,
+            ),
+            "ideal-friction",
+        ).q[-1]
+        for floor in ([(-0.2, 1.0)], [(-0.2, 0.2), (0.2, 0.3), (0.3, 0.4), (0.4, 1.0)])
+    )
+    assert one[0] > 0.44
+    assert tiled == pytest.approx(one, abs=1e-9)
