@@ -297,7 +297,7 @@ def _follow(spec: Any, made: dict[str | None, Any], body: Body) -> None:
         type=_mujoco().mjtEq.mjEQ_JOINT,
         name1=follower.name,
         name2=leader.name,
-        data=[mimic.offset, mimic.multiplier, *[0.0] * 9],
+        data=[mimic.offset, mimic.multiplier, *[0.0] * 10],
         solref=[2.0 * spec.option.timestep, 1.0],
         solimp=HARD,
     )

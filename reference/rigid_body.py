@@ -7,7 +7,7 @@ engine's conventions.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache, cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -41,25 +41,49 @@ class PinocchioMechanism:
 
     Parameters
     ----------
-    model : a pinocchio.Model with one body frame per body, with the body's name
+    model : a pinocchio.Model with one body frame per body, with the body's name, as if all joints
+        moved by themselves
+    followers : list of (joint, leader, multiplier, offset)
+        Joints that follow others, as numbers of joints with one coordinate in the model. The
+        model's coordinates are then A q + b, its velocities G v. Pinocchio's own mimic joints lack
+        energies, momentum and the articulated body algorithm.
     """
 
-    def __init__(self, model: Any) -> None:
+    def __init__(self, model: Any, followers: Sequence[tuple[int, int, float, float]] = ()) -> None:
         self.pin, self.model, self.data = _pinocchio(), model, model.createData()
-        self.nq, self.nv = int(model.nq), int(model.nv)
-        self._below = np.tril_indices(self.nv, -1)
+        self._below = np.tril_indices(model.nv, -1)
+        spread_q, spread = np.eye(model.nq), np.eye(model.nv)
+        self._offset = np.zeros(model.nq)
+        at = [(model.joints[i], model.joints[k], *rest) for i, k, *rest in followers]
+        for joint, leader, multiplier, offset in at:
+            spread_q[joint.idx_q, leader.idx_q] = multiplier
+            spread[joint.idx_v, leader.idx_v] = multiplier
+            self._offset[joint.idx_q] = offset
+        self._own = np.delete(np.arange(model.nq), [joint.idx_q for joint, *_ in at])
+        self._spread_q = spread_q[:, self._own]
+        self._spread = np.delete(spread, [joint.idx_v for joint, *_ in at], axis=1)
+        self._follows = bool(at)
+        self.nq, self.nv = len(self._own), self._spread.shape[1]
         body = (
             self.pin.FrameType.BODY
         )  # frames of the bodies, in the mechanism's order; the first frame is the world
         self._bodies = [k for k, frame in enumerate(model.frames) if k and frame.type == body]
         self._places = {model.frames[k].name: place for place, k in enumerate(self._bodies)}
 
+    def _at(self, q: Floats) -> Floats:
+        """Return all coordinates of the model."""
+        return self._spread_q @ q + self._offset if self._follows else q
+
+    def _rates(self, v: Floats) -> Floats:
+        """Return all velocities of the model."""
+        return self._spread @ v if self._follows else v
+
     def mass_matrix(self, q: Floats) -> Floats:
         """Return M(q) (d, d) by the composite rigid body algorithm, which fills the upper
         triangle."""
-        mass = np.array(self.pin.crba(self.model, self.data, q))
+        mass = np.array(self.pin.crba(self.model, self.data, self._at(q)))
         mass[self._below] = mass.T[self._below]
-        return mass
+        return self._spread.T @ mass @ self._spread if self._follows else mass
 
     def bias(self, q: Floats, v: Floats) -> Floats:
         """Return B(q, v) (d,) without gravity."""
@@ -76,12 +100,14 @@ class PinocchioMechanism:
     def inverse_dynamics(self, q: Floats, v: Floats, dv: Floats, g: ArrayLike) -> Floats:
         """Return tau = M dv + B + G (d,)."""
         self.model.gravity.linear = np.array(g, dtype=np.float64)
-        return np.array(self.pin.rnea(self.model, self.data, q, v, dv))
+        given = self._at(q), self._rates(v), self._rates(dv)
+        forces = np.array(self.pin.rnea(self.model, self.data, *given))
+        return self._spread.T @ forces if self._follows else forces
 
     def bodies(self, q: Floats) -> tuple[Floats, Floats, Floats]:
         """Return axes (n + 1, 3, 3), origins (n + 1, 3), Jacobians (n + 1, 6, d) of n bodies and,
         last, the world."""
-        self.pin.computeJointJacobians(self.model, self.data, q)
+        self.pin.computeJointJacobians(self.model, self.data, self._at(q))
         self.pin.updateFramePlacements(self.model, self.data)
         n, world = len(self._bodies), self.pin.LOCAL_WORLD_ALIGNED
         axes, origins, rows = (
@@ -93,36 +119,40 @@ class PinocchioMechanism:
         for b, frame in enumerate(self._bodies):
             placed = self.data.oMf[frame]
             axes[b], origins[b] = placed.rotation, placed.translation
-            rows[b] = self.pin.getFrameJacobian(self.model, self.data, frame, world).reshape(
-                6, self.nv
-            )
+            own = self.pin.getFrameJacobian(self.model, self.data, frame, world)
+            rows[b] = own @ self._spread if self._follows else own.reshape(6, self.nv)
         return axes, origins, rows
 
     def kinetic_energy(self, q: Floats, v: Floats) -> float:
         """Return the kinetic energy [J]."""
-        return float(self.pin.computeKineticEnergy(self.model, self.data, q, v))
+        given = self._at(q), self._rates(v)
+        return float(self.pin.computeKineticEnergy(self.model, self.data, *given))
 
     def potential_energy(self, q: Floats, g: ArrayLike) -> float:
         """Return the potential energy [J] of the bodies that can move."""
         self.model.gravity.linear = np.array(g, dtype=np.float64)
-        return float(self.pin.computePotentialEnergy(self.model, self.data, q))
+        return float(self.pin.computePotentialEnergy(self.model, self.data, self._at(q)))
 
     def centroidal_momentum(self, q: Floats, v: Floats) -> Floats:
         """Return momentum and angular momentum about the centre of mass (6,) [N s, N m s]."""
-        return np.array(self.pin.computeCentroidalMomentum(self.model, self.data, q, v).vector)
+        given = self._at(q), self._rates(v)
+        return np.array(self.pin.computeCentroidalMomentum(self.model, self.data, *given).vector)
 
     def integrate(self, q: Floats, v: Floats, dt: float) -> Floats:
         """Return the configuration (nq,) after dt [s] with constant v."""
-        return np.array(self.pin.integrate(self.model, q, v * dt))
+        return np.array(self.pin.integrate(self.model, self._at(q), self._rates(v) * dt))[self._own]
 
     def normalize(self, q: Floats) -> Floats:
         """Return q (nq,) with its quaternions and (cos, sin) scaled to length one."""
-        return np.array(self.pin.normalize(self.model, q))
+        return np.array(self.pin.normalize(self.model, self._at(q)))[self._own]
 
     def rate(self, q: Floats, v: Floats) -> Floats:
         """Return dq/dt (nq,) of a motion with velocity v (d,) through q; this is v itself if nq =
         d."""
-        return v if self.nq == self.nv else np.asarray(_rates(self._layout, q, v))
+        if self.nq == self.nv:
+            return v
+        rates = _rates(self._layout, self._at(q), self._rates(v))
+        return np.asarray(rates)[self._own]
 
     @cached_property
     def _layout(self) -> NDArray[np.int64]:
@@ -132,11 +162,13 @@ class PinocchioMechanism:
             (_TURNING.get(joint.shortname(), -1), joint.idx_q, joint.idx_v)
             for joint in self.model.joints
         ]
-        return np.array([*rows[1:], (-1, self.nq, self.nv)], np.int64)
+        return np.array([*rows[1:], (-1, self.model.nq, self.model.nv)], np.int64)
 
     def free_acceleration(self, q: Floats, v: Floats) -> Floats:
         """Return dv/dt = −M⁻¹ B (d,) of the motion without forces, by the articulated body
         algorithm."""
+        if self._follows:
+            return np.asarray(np.linalg.solve(self.mass_matrix(q), -self.bias(q, v)))
         self.model.gravity.linear = np.zeros(3)
         return np.array(self.pin.aba(self.model, self.data, q, v, np.zeros(self.nv)))
 
@@ -147,7 +179,9 @@ class PinocchioMechanism:
         rng = np.random.default_rng(0)
         for _ in range(_MOTIONS):
             v = rng.normal(size=self.nv)
-            q = self.integrate(self.pin.neutral(self.model), rng.normal(size=self.nv), 1.0)
+            q = self.integrate(
+                self.pin.neutral(self.model)[self._own], rng.normal(size=self.nv), 1.0
+            )
             scale = np.abs(self.mass_matrix(q)).sum(axis=1) * (v @ v)
             if (np.abs(self.bias(q, v)) > _NO_BIAS * scale).any():
                 return True
@@ -166,75 +200,6 @@ class PinocchioMechanism:
         if body not in self._places:
             raise ArgumentError("body", body, "the name of a body of the model")
         return self._places[body]
-
-
-class Following(PinocchioMechanism):
-    """A Pinocchio model some of whose joints follow others: its coordinates are A q + b, its
-    velocities G v.
-
-    Pinocchio's own mimic joints lack energies, momentum and the articulated body algorithm.
-
-    Parameters
-    ----------
-    model : as if all joints moved by themselves
-    followers : list of (joint, leader, multiplier, offset)
-        Numbers of joints with one coordinate in the model.
-    """
-
-    def __init__(self, model: Any, followers: list[tuple[int, int, float, float]]) -> None:
-        super().__init__(model)
-        self.full = PinocchioMechanism(model)
-        at = [(model.joints[i], model.joints[k], *rest) for i, k, *rest in followers]
-        self._q = np.delete(np.arange(model.nq), [one.idx_q for one, *_ in at])
-        self._v = np.delete(np.arange(model.nv), [one.idx_v for one, *_ in at])
-        self._spread_q, self._spread = np.eye(model.nq), np.eye(model.nv)
-        self._offset = np.zeros(model.nq)
-        for one, leader, multiplier, offset in at:
-            self._spread_q[one.idx_q, leader.idx_q] = multiplier
-            self._spread[one.idx_v, leader.idx_v] = multiplier
-            self._offset[one.idx_q] = offset
-        self._spread_q, self._spread = self._spread_q[:, self._q], self._spread[:, self._v]
-        self.nq, self.nv = len(self._q), len(self._v)
-
-    def _at(self, q: Floats) -> Floats:
-        return np.asarray(self._spread_q @ q + self._offset)
-
-    def _rates(self, v: Floats) -> Floats:
-        return np.asarray(self._spread @ v)
-
-    def mass_matrix(self, q: Floats) -> Floats:
-        return np.asarray(self._spread.T @ self.full.mass_matrix(self._at(q)) @ self._spread)
-
-    def inverse_dynamics(self, q: Floats, v: Floats, dv: Floats, g: ArrayLike) -> Floats:
-        forces = self.full.inverse_dynamics(self._at(q), self._rates(v), self._rates(dv), g)
-        return np.asarray(self._spread.T @ forces)
-
-    def bodies(self, q: Floats) -> tuple[Floats, Floats, Floats]:
-        axes, origins, rows = self.full.bodies(self._at(q))
-        return axes, origins, rows @ self._spread
-
-    def kinetic_energy(self, q: Floats, v: Floats) -> float:
-        return self.full.kinetic_energy(self._at(q), self._rates(v))
-
-    def potential_energy(self, q: Floats, g: ArrayLike) -> float:
-        return self.full.potential_energy(self._at(q), g)
-
-    def centroidal_momentum(self, q: Floats, v: Floats) -> Floats:
-        return self.full.centroidal_momentum(self._at(q), self._rates(v))
-
-    def integrate(self, q: Floats, v: Floats, dt: float) -> Floats:
-        return self.full.integrate(self._at(q), self._rates(v), dt)[self._q]
-
-    def normalize(self, q: Floats) -> Floats:
-        return self.full.normalize(self._at(q))[self._q]
-
-    def rate(self, q: Floats, v: Floats) -> Floats:
-        return self.full.rate(self._at(q), self._rates(v))[self._q]
-
-    def free_acceleration(self, q: Floats, v: Floats) -> Floats:
-        return np.asarray(np.linalg.solve(self.mass_matrix(q), -self.bias(q, v)))
-
-    has_bias = True
 
 
 def at_lever(jacobian: Floats, lever: Floats) -> Floats:
@@ -279,7 +244,7 @@ def model_from_urdf(path: str | Path, floating_base: bool = False) -> PinocchioM
         if joint.shortname() == "JointModelMimic":
             follows = joint.extract()
             followers.append((i, leaders[joint.idx_q], follows.scaling, follows.offset))
-    return Following(model, followers) if followers else PinocchioMechanism(model)
+    return PinocchioMechanism(model, followers)
 
 
 def model_of(mechanism: Mechanism) -> PinocchioMechanism:
@@ -331,7 +296,7 @@ def model_of(mechanism: Mechanism) -> PinocchioMechanism:
         for body in mechanism.bodies
         if body.mimic is not None
     ]
-    return Following(model, followers) if followers else PinocchioMechanism(model)
+    return PinocchioMechanism(model, followers)
 
 
 # Pinocchio's joints that form each joint.

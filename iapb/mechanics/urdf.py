@@ -18,7 +18,7 @@ from __future__ import annotations
 import difflib
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
@@ -107,8 +107,8 @@ def read_robot(
     floating_base : bool
         True: the root link moves freely (free flyer); False: it is fixed to the world.
     leave_out : mapping
-        Parts of joints to leave out, by joint: limit, dynamics, mimic, or joint: the joint itself,
-        with the links that it alone carries.
+        Parts of joints to leave out, by joint: limit, dynamics, mimic, or joint: it is welded, or
+        taken away if another joint carries its child.
 
     Raises
     ------
@@ -117,13 +117,13 @@ def read_robot(
         counterpart; the message names the file, the element and what was expected.
     """
     robot, ignored = parse_robot(Path(path))
-    dropped = _left_out(robot, leave_out or {})
+    _leave_out(robot, leave_out or {})
     inertials = {
         name: _inertial(element) for name, element in elements_by_name(robot, "link").items()
     }
     elements = elements_by_name(robot, "joint")
     joints = _Joints(elements, ignored)
-    held: dict[str, tuple[str, Link]] = {}  # link -> its parent, and the link without inertia
+    held: dict[str, Link] = {}  # links that a joint carries
     children: dict[str, list[str]] = {name: [] for name in inertials}
     for name, element in sorted(elements.items(), key=lambda item: item[0].encode()):
         where = where_of(element)
@@ -136,17 +136,20 @@ def read_robot(
                 f"{_leaving(name, 'joint')}",
             )
         body = Body(child, parent, _joint(element), origin_of(element, where), *inertials[child])
-        held[child] = parent, joints.link(element, body)
+        held[child] = joints.link(element, body)
         children[parent].append(child)
     joints.refuse_empty_ranges()
-    roots = [name for name in inertials if name not in held and name not in dropped]
+    roots = [name for name in inertials if name not in held]
     if len(roots) != 1:
         raise ArgumentError("links without a parent", roots, "exactly one, the root")
     base = Joint("free_flyer" if floating_base else "fixed")
     links = [Link(Body(roots[0], None, base, _HERE, *inertials[roots[0]]), roots[0])]
-    for link in _carried(children, roots):
-        links += _with_plane(held[link][1])
-    reached = {*roots, *_carried(children, roots), *dropped, *_carried(children, dropped)}
+    stack, reached = children[roots[0]][::-1], set(roots)  # instead of recursion, for any depth
+    while stack:
+        link = stack.pop()
+        reached.add(link)
+        links += _with_plane(held[link])
+        stack.extend(children[link][::-1])
     if lost := sorted(inertials.keys() - reached):
         raise ArgumentError(
             "links",
@@ -160,28 +163,23 @@ def read_robot(
 _HERE = (np.eye(3), np.zeros(3))
 
 
-def _left_out(robot: ElementTree.Element, leave_out: LeaveOut) -> list[str]:
-    """Remove the parts of joints that are left out; return the links that no joint carries
-    then."""
-    joints, dropped = elements_by_name(robot, "joint"), list[str]()
+def _leave_out(robot: ElementTree.Element, leave_out: LeaveOut) -> None:
+    """Take away the parts of joints that are left out; weld a joint whose child no other one
+    carries."""
+    joints = elements_by_name(robot, "joint")
+    ends = [child.get("link") for child in robot.findall("joint/child")]
     for name, parts in leave_out.items():
         if name not in joints:
             raise ArgumentError("leave_out", name, one_of(name, joints, "a joint of it: "))
-        element = joints[name]
-        for part in parts:
-            found = element.find(part)
-            if part == "joint":
-                robot.remove(element)
-                child = element.find("child")
-                dropped.append("" if child is None else child.get("link", ""))
-            elif found is not None:
-                element.remove(found)
-    kept = {
-        child.get("link")
-        for joint in robot.findall("joint")
-        if (child := joint.find("child")) is not None
-    }
-    return [link for link in dropped if link not in kept]
+        joint = joints[name]
+        for part in joint.findall("*"):
+            if part.tag in parts:
+                joint.remove(part)
+        if "joint" in parts:
+            child = joint.find("child")
+            if child is not None and ends.count(child.get("link")) > 1:
+                robot.remove(joint)
+            joint.set("type", "fixed")
 
 
 def _leaving(joint: str, part: str) -> str:
@@ -197,15 +195,6 @@ def _end(joint: ElementTree.Element, tag: str, links: Mapping[str, Any]) -> str:
             f"{where_of(joint)} {tag}", link, f'<{tag} link="..."/> with the name of a <link>'
         )
     return link
-
-
-def _carried(children: Mapping[str, list[str]], roots: Sequence[str]) -> Iterator[str]:
-    """Yield the links that the roots carry, depth first."""
-    stack = [link for root in roots[::-1] for link in children.get(root, [])[::-1]]
-    while stack:  # instead of recursion, for any depth
-        link = stack.pop()
-        yield link
-        stack.extend(children[link][::-1])
 
 
 def _with_plane(link: Link) -> list[Link]:
@@ -278,7 +267,7 @@ class _Joints:
         where = f"{where_of(element)} limit"
         lower, upper = (_number(where, limit, bound, "0") for bound in ("lower", "upper"))
         if lower > upper:
-            raise ArgumentError(where, [lower, upper], "lower <= upper")
+            raise ArgumentError(where, [lower, upper], f"lower < upper; {_leaving(name, 'limit')}")
         self.empty += [name] * (lower == upper)
         if max(-lower, upper) > FARTHEST and min(-lower, upper) > FARTHEST:
             return None

@@ -200,24 +200,21 @@ Shapes = Annotated[
         description="what can touch; none: the body passes through everything",
     ),
 ]
-JointDamping = Annotated[
+PerVelocity = Annotated[
     tuple[NonNegative, ...],
     BeforeValidator(
         lambda given: (given,) if isinstance(given, int | float) else given,
         json_schema_input_type=NonNegative | tuple[NonNegative, ...],
     ),
+]
+JointDamping = Annotated[
+    PerVelocity,
     Field(
         description="viscous damping of its joint [N s/m, N m s/rad], one number per velocity; default: none"
     ),
 ]
-
-
 JointFriction = Annotated[
-    tuple[NonNegative, ...],
-    BeforeValidator(
-        lambda given: (given,) if isinstance(given, int | float) else given,
-        json_schema_input_type=NonNegative | tuple[NonNegative, ...],
-    ),
+    PerVelocity,
     Field(
         description="Coulomb's dry friction of its joint [N, N m], one number per velocity; default: none"
     ),

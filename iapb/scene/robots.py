@@ -62,8 +62,8 @@ class Robot(ScenePart):
     )
     leave_out: dict[str, tuple[Literal["joint", "limit", "dynamics", "mimic"], ...]] = Field(
         default_factory=dict,
-        description="parts of joints to leave out, by joint: limit, dynamics, mimic; or joint, the "
-        "joint itself with the links that it alone carries",
+        description="parts of joints to leave out, by joint: limit, dynamics, mimic; joint: it is "
+        "welded, or taken away if another joint carries its child",
     )
 
 

@@ -45,6 +45,7 @@ LEFT_OUT: dict[str, dict[str, Any]] = {  # effect -> the variant of the scene wi
             "varying_inertia",
             "velocity_terms",
             "joint_damping",
+            "joint_friction",
             "joint_limits",
             "unequal_restitution",
         )

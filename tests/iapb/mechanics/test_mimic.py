@@ -12,6 +12,9 @@ from iapb.mechanics.bodies import Body
 from iapb.mechanics.joints import Joint, Mimic, ranges_of
 from iapb.mechanics.mechanism import Mechanism
 from iapb.mechanics.urdf import read_urdf
+from iapb.scene import scene_from_text
+from iapb.scene.mechanism import mechanism_of
+from iapb.simulation import simulate
 from reference.rigid_body import model_from_urdf, model_of
 from verification.mechanics.against_pinocchio import AGREEMENT, compare
 
@@ -102,3 +105,39 @@ def test_limits_of_what_follows_bound_the_leader() -> None:
 def test_a_leader_without_one_coordinate_is_refused(leader: str) -> None:
     with pytest.raises(ArgumentError, match="mimic"):
         tree(None, Mimic("a"), Mimic(leader), None)
+
+
+def test_free_motion_keeps_energy_and_momentum_where_joints_follow() -> None:
+    solid = "mass: 1, inertia: [0.1, 0.2, 0.2], center_of_mass: [0.3, 0.1, 0.1]"
+    scene = scene_from_text(f"""name: free
+dimensions: 3
+rate: 1000
+duration: 1
+bodies:
+  - {{name: base, joint: free_flyer, {solid}, velocity: [0.1, 0.2, -0.1, 0.5, 1, 0.3]}}
+  - {{name: a, parent: base, joint: revolute, axis: [0, 1, 0], origin: [0.3, 0, 0], {solid}, velocity: [2]}}
+  - {{name: b, parent: a, joint: revolute, axis: [1, 0, 0], origin: [0.5, 0, 0], {solid},
+     joint_mimic: {{body: a, multiplier: -1.5, offset: 0.3}}}}
+  - {{name: c, parent: base, joint: prismatic, axis: [0, 0, 1], {solid}, joint_mimic: {{body: a}}}}
+""")
+    run, mechanism = simulate(scene), mechanism_of(scene)
+    kinetic = run.energy["kinetic"]
+    assert np.ptp(kinetic) < 1e-11 * kinetic[0] and not run.distrust
+    first, last = (mechanism.centroidal_momentum(run.q[k], run.v[k]) for k in (0, -1))
+    np.testing.assert_allclose(first, last, atol=1e-10)
+    assert np.ptp(run.q[:, 7]) > 1.0
+
+
+def test_mujoco_moves_a_gripper_as_the_engine_does() -> None:
+    scene = scene_from_text("""name: gripper
+rate: 1000
+duration: 0.5
+gravity: [0, -9.81]
+bodies:
+  - {name: left, joint: prismatic, axis: [0, 1], mass: 1, joint_limits: [-0.1, 0.1]}
+  - {name: right, parent: left, joint: revolute, mass: 1, center_of_mass: [0.1, 0], inertia: 0.1,
+     joint_mimic: {body: left, multiplier: 5, offset: 0.3}}
+""")
+    engine, mujoco = simulate(scene, steps=100), simulate(scene, steps=100, world="mujoco")
+    np.testing.assert_allclose(mujoco.q, engine.q, atol=1e-3)
+    assert engine.q[-1, 0] < -0.02

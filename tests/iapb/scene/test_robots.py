@@ -136,7 +136,7 @@ def test_a_range_of_one_point_is_refused_and_can_be_left_out(load: Load, limit: 
 @pytest.mark.parametrize(
     ("inside", "named"),
     [
-        ('<limit lower="1" upper="-1"/>', "lower <= upper"),
+        ('<limit lower="1" upper="-1"/>', "leave_out: {slide: [limit]}"),
         ('<limit lower="a" upper="1"/>', "'slide'> limit lower"),
         ('<limit lowr="-1" upper="1"/>', "did you mean lower"),
         ('<limt lower="-1" upper="1"/>', "misspelt"),
@@ -262,14 +262,12 @@ def test_a_plain_robot_is_read_without_a_remark(load: Load) -> None:
 # what cannot be simulated is refused, and can be left out
 
 
-def test_an_unknown_joint_type_is_refused_and_can_be_left_out_with_what_it_carries(
-    load: Load,
-) -> None:
+def test_an_unknown_joint_type_is_refused_and_can_be_welded(load: Load) -> None:
     screw = joint("bolt", "nut", "screw"), joint("tip", "end", "fixed", parent="nut")
     parts = PALM, FINGER, link("nut"), link("end"), SLIDE, *screw
     assert "leave_out: {bolt: [joint]}" in refusal(load, *parts)
     scene = load(*parts, more="leave_out: {bolt: [joint]}")
-    assert [body.name for body in scene.bodies] == ["r_palm", "r_finger"]
+    assert [body.joint for body in scene.bodies] == ["fixed", "fixed", "fixed", "prismatic"]
 
 
 def test_a_loop_is_refused_and_can_be_cut(load: Load) -> None:
@@ -439,3 +437,18 @@ def test_a_planar_joint_has_pinocchios_mass_matrix(load: Load, tmp_path: Path) -
     mine = Mechanism.from_urdf(tmp_path / "r.urdf")
     theirs = pin.crba(model, model.createData(), pin.neutral(model))
     np.testing.assert_allclose(mine.mass_matrix(mine.neutral()), theirs, atol=1e-15)
+
+
+@pytest.mark.parametrize("rpy", [[0.0, 0.0, 0.7], [1.0, 0.5, 0.0]])
+def test_a_turned_planar_base_moves_as_one_that_is_not_turned(rpy: list[float]) -> None:
+    """Without gravity: the links that it carries have the same joint angles, and energy stays."""
+    bodies = [
+        f"{{name: a, joint: planar, rpy: RPY, velocity: [0.3, -0.2, 1.0], {SOLID}}}",
+        "{name: b, parent: a, joint: revolute, axis: [0, 0, 1], origin: [0.4, 0, 0], mass: 1, "
+        "inertia: [0.1, 0.2, 0.2], center_of_mass: [0.3, 0, 0], velocity: [-3]}",
+    ]
+    text = YAML.replace("0.01", "1") + "".join(f"  - {body}\n" for body in bodies)
+    turned, plain = (
+        simulate(scene_from_text(text.replace("RPY", str(value)))) for value in (rpy, [0.0] * 3)
+    )
+    np.testing.assert_allclose(turned.q, plain.q, atol=1e-12)
