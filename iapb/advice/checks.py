@@ -27,7 +27,7 @@ from iapb.contact.kernels.narrow_phase import detect
 from iapb.names import in_metres
 from iapb.scene import Scene, SpatialScene, mechanism
 from iapb.scene.bodies import inertia_matrix
-from iapb.scene.parts import STIFFEST, written
+from iapb.scene.parts import STIFFEST
 from iapb.schema import Floats, Integers, zeros_of
 
 Rows = Integers  # numbers of contacts
@@ -427,8 +427,8 @@ def _degrees(scene: Scene) -> Iterator[Caution]:
         if abs(angle) > math.tau and angle % unit == 0.0:
             yield Caution(
                 "degrees",
-                written(path),
-                f"{scene.place_of(*path)}{written(path)} = {angle:g} rad looks "
+                scene.field_name(*path),
+                f"{scene.place_of(*path)}{scene.field_name(*path)} = {angle:g} rad looks "
                 f"like degrees: set {math.radians(angle):.6g}, for angles are in radians",
             )
 
@@ -442,8 +442,8 @@ def _inertias(scene: Scene) -> Iterator[Caution]:
             path = ("bodies", i, "inertia")
             yield Caution(
                 "inertia",
-                written(path),
-                f"{scene.place_of(*path)}{written(path)}: no body has a moment of "
+                scene.field_name(*path),
+                f"{scene.place_of(*path)}{scene.field_name(*path)}: no body has a moment of "
                 f"{high:.3g} kg m2 beside {low:.3g} and {middle:.3g}; it is at most their sum",
             )
 

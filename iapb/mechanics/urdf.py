@@ -68,7 +68,6 @@ _SHAPES = ("visual", "collision")
 _NEAR, _NEAR_ATTRIBUTE = 0.75, 0.6
 MAX_BYTES = 10_000_000  # the largest known robot file has a tenth of this
 FARTHEST = 1e9  # m, rad: a bound beyond it is none, as of rotors that say 1e16
-PARTS = ("joint", "limit", "dynamics", "mimic")  # of a joint that `leave_out` can name
 
 LeaveOut = Mapping[str, Sequence[str]]
 

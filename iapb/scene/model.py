@@ -55,6 +55,7 @@ from iapb.scene.parts import (
     Vector3,
     mistakes_of,
     require,
+    written,
 )
 from iapb.scene.robots import Robot
 
@@ -386,6 +387,12 @@ class Scene(ScenePart):
             return ""
         line, column = Document(self._source_text).place(path)
         return f"{self._file}:{line}:{column}: "
+
+    def field_name(self, *path: str | int) -> str:
+        """Return the path of a field; bodies of a robot, which no file numbers, by name."""
+        if self._file or path[0] != "bodies":
+            return written(path)
+        return written(("bodies", self.bodies[int(path[1])].name, *path[2:]))
 
     def resolved(self) -> dict[str, Any]:
         """Return every field with its value, defaults included, as plain numbers, texts, lists and

@@ -312,7 +312,7 @@ walls:
         "bodies": [solid | {"shapes": [{"kind": "box", "size": [0.1, 0.1, 0.1]}]}],
     }
     assert {one.where for one in check_scene(SpatialScene.model_validate(spatial))} == {
-        "bodies[0].rpy[1]"
+        "bodies.box_0.rpy[1]"
     }
 
 

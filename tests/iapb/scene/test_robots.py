@@ -326,6 +326,12 @@ def test_a_mistake_of_a_robots_body_names_robot_link_and_joint(load: Load) -> No
     assert "bodies[" not in said and "default" not in said
 
 
+def test_a_caution_names_the_body_of_a_robot(load: Load) -> None:
+    turn = joint("turn", "finger", "revolute", '<limit lower="-90" upper="90"/>')
+    said = [str(caution) for caution in check_scene(load(PALM, FINGER, turn))]
+    assert len(said) == 2 and said[0].startswith("bodies.r_finger.joint_limits[0] = -90 rad")
+
+
 # joints that move no mass
 
 YAML = """name: chain
