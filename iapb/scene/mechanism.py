@@ -84,9 +84,11 @@ def joint_fault(scene: Scene) -> tuple[int, str, Any, str] | None:
     which a body that it carries may have.
     """
     for i, (body, limits) in enumerate(zip(scene.bodies, limits_of(scene), strict=True)):
-        if limits and not limits[0] <= body.position[0] <= limits[1]:
-            said = f"a start within [{limits[0]:g}, {limits[1]:g}], the limits of {body.name} and "
-            return i, "position", list(body.position), f"{said}of what follows it"
+        low, high = limits or (-math.inf, math.inf)
+        if limits and not (low < high and low <= body.position[0] <= high):
+            said = f"a start within [{low:g}, {high:g}], the range that the limits of {body.name} "
+            said += "and of what follows it have in common"
+            return i, "position", list(body.position), said
     if all(_moves_its_own(body) for body in scene.bodies):
         return None
     mechanism, (q, _) = mechanism_of(scene), start_of(scene)

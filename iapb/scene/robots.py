@@ -216,11 +216,12 @@ def _start(robot: Robot, link: Link, limits: Range | None) -> tuple[float, ...]:
     if limits is None or (given and len(given) != 1):
         return given or neutral
     low, high = limits
-    if low > high:
+    if low >= high:
         raise ArgumentError(
             f"limits of robot {robot.name}, link {link.name}",
             [low, high],
-            f"limits of joint {link.joint} and of those that follow it with a range in common",
+            f"limits of joint {link.joint} and of those that follow it with a range in common; "
+            "leave_out: {JOINT: [limit]} leaves those of one out",
         )
     if given and not low <= given[0] <= high:
         raise ArgumentError(

@@ -220,7 +220,12 @@ def test_a_start_follows_the_leader_and_stays_within_both_ranges(load: Load) -> 
     assert "position" in refusal(
         load, *parts, follower('joint="slide"'), more="position: {thumb: [0]}"
     )
-    assert "range in common" in refusal(load, *parts, follower('joint="slide" offset="1"'))
+    point = '<limit lower="0.02" upper="0.04"/>'  # of its negative: one point of the leader's range
+    for other in (
+        follower('joint="slide" offset="1"'),
+        follower('joint="slide" multiplier="-1"', point),
+    ):
+        assert "range in common" in refusal(load, *parts, other)
     with pytest.raises(ArgumentError, match="of what follows it"):
         simulate(scene.with_values({"bodies.r_thumb.joint_mimic.offset": 0.1}))
 
