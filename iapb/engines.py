@@ -151,7 +151,7 @@ def run_of_states(
         v=rates,
         pose=mechanism.poses(places, planar=not isinstance(scene, SpatialScene)),
         contacts=zeros_of(ContactTable, contact=0, axis=3, step_edge=steps + 1),
-        impacts=zeros_of(ImpactTable, impact=0, velocity=mechanism.nv),
+        impacts=zeros_of(ImpactTable, impact=0, velocity=mechanism.nv, coordinate=mechanism.nq),
         energy={"kinetic": kinetic, "potential": potential, "hand_work": work},
         effects=tuple(EffectRow(field, False, reason, field) for field in engine.ignored(scene)),
         chunk_steps=np.array([steps], np.int64),

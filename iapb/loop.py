@@ -10,7 +10,7 @@ from iapb.compiled import Entry, block, copy_into, kernel
 from iapb.contact.kernels.step import STATUS_TEXT, advance, contact_state
 from iapb.haptics.rendering import NO_COUPLING, couple, move_device, render
 from iapb.linalg import load, store
-from iapb.run import ContactTable, ImpactTable, Run
+from iapb.run import MADE_AFTERWARDS, ContactTable, ImpactTable, Run
 from iapb.schema import Quantity, blank, quantities
 
 DEVICE_NOT_FINITE = 1 + max(STATUS_TEXT)
@@ -29,7 +29,7 @@ STEPS = (
     Quantity("contact_count", ("step",), np.int64, "1", "contacts of the step"),
 )
 CONTACTS = quantities(ContactTable, "contact")
-IMPACTS = tuple(each for each in quantities(ImpactTable) if each.name != "mass_digest")
+IMPACTS = tuple(each for each in quantities(ImpactTable) if each.name not in MADE_AFTERWARDS)
 LINES = {"steps": STATES + STEPS, "contacts": CONTACTS, "impacts": IMPACTS}
 
 Coordinates = tuple[int, int, int, int]

@@ -154,6 +154,7 @@ class Recorder:
         steps, impacts = self.joined("steps"), self.joined("impacts")
         offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(steps.pop("contact_count"))])
         struck = steps["q"][impacts["step"] - self.first]
+        impacts |= {"time": impacts["step"] * system.dt, "q": struck}
         ledger, planar = self._ledger, not isinstance(scene, SpatialScene)
         later: dict[str, Any] = {
             "scene_source": Later(lambda run: scene.source_text),

@@ -107,6 +107,12 @@ class ImpactTable:
             "first 8 bytes of BLAKE2b of M made again from the recorded q, as a signed integer",
         ),
     ]
+    time: Annotated[Floats, quantity("impact", "s", "when it happened: the start of its step")]
+    q: Annotated[Floats, quantity("impact coordinate", POSITION, "configuration at that time")]
+
+
+# columns of ImpactTable that are made after the run
+MADE_AFTERWARDS = ("mass_digest", "time", "q")
 
 
 def digests(matrices: Floats) -> Integers:

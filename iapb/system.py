@@ -26,11 +26,10 @@ from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling, UnilateralCoupler
 from iapb.haptics.rendering import PLANNED, Port
 from iapb.linalg import cholesky
-from iapb.loop import ADVANCE, make_record, run_steps
+from iapb.loop import ADVANCE, IMPACTS, make_record, run_steps
 from iapb.mechanics.kernels.arrays import make_workspace
 from iapb.mechanics.mechanism import Mechanism
 from iapb.mechanics.structure import make_free_motion
-from iapb.run import ImpactTable
 from iapb.scene import Scene, SpatialScene
 from iapb.scene import mechanism as scene_parts
 from iapb.schema import blank, quantities, zeros_of
@@ -213,7 +212,7 @@ class System:
             scene.largest_friction > 0.0 and not per_body
         )  # per-body rows have no slip: no friction in impacts
         soft = contact.forces == "implicit" or bool(self.joint_friction.any())
-        log = blank(quantities(ImpactTable)[1:], {"impact": trees, "velocity": d})
+        log = blank(IMPACTS[1:], {"impact": trees, "velocity": d})
         for name, value in {
             "scale": 1,
             "clamp": 1,

@@ -14,7 +14,17 @@ from iapb.errors import ArgumentError
 from reports.provenance import linear_algebra
 from reports.resimulate import repeat_run
 from reports.show import Answer, Json, one_line, said, stage_progress
-from reports.store.check import DAMAGED, FOREIGN, OTHER, WHOLE, check_store, is_run
+from reports.store.check import (
+    CHANGED,
+    DAMAGED,
+    FOREIGN,
+    OPEN,
+    OTHER,
+    WHOLE,
+    check_store,
+    is_run,
+    seal_again,
+)
 from reports.store.runs import read_provenance
 
 
@@ -23,9 +33,13 @@ class Action(StrEnum):
 
     check = "check"
     again = "again"
+    seal = "seal"
 
 
-_ACTION = "check: read every file whole. again: simulate runs again and compare bit for bit."
+_ACTION = (
+    "check: read every file whole. again: simulate runs again and compare bit for bit. seal: check, "
+    "and seal again what was changed while its data stayed whole."
+)
 
 
 def store(
@@ -40,11 +54,12 @@ def store(
         raise ArgumentError("where", str(where), "a folder of results, or a run file")
     if where.resolve() == Path(where.resolve().anchor):
         raise ArgumentError("where", str(where), "a folder of results, not a whole file system")
-    return _again(where) if action is Action.again else _checked(where)
+    return _again(where) if action is Action.again else _checked(where, action is Action.seal)
 
 
-def _checked(where: Path) -> Answer:
-    """Read every file; list those that are not whole, and count the states."""
+def _checked(where: Path, seal: bool) -> Answer:
+    """Read every file; list those that are not whole, and count the states; seal changed ones
+    again."""
     with stage_progress() as progress:
         states = check_store(where, partial(progress, "files read whole"))
     count = Counter(state.state for state in states)
@@ -57,7 +72,11 @@ def _checked(where: Path) -> Answer:
     lines.append(f"{len(states)} files: {parts or 'none'}")
     if count[DAMAGED]:
         lines.append("Remove a damaged run to have it computed again.")
-    failed = count[DAMAGED] or where.is_file() and count[FOREIGN] + count[OTHER]
+    for state in states if seal else ():
+        if state.state == CHANGED:
+            seal_again(state)
+            lines.append(f"{one_line(state.path)}: sealed again")
+    failed = count[DAMAGED] or where.is_file() and count[FOREIGN] + count[OTHER] + count[OPEN]
     return Answer({"files": states, "count": count}, lines, int(bool(failed)))
 
 

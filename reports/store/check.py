@@ -1,5 +1,5 @@
 """Check result files: read each completely, and compare it with its seal, a run also with its
-content hash."""
+content hash; seal files again whose data are whole."""
 
 from __future__ import annotations
 
@@ -7,12 +7,24 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from iapb.errors import RunFileError
+from iapb.errors import IapbError, RunFileError
 from reference.hdf5 import attribute_of
 from reports.store.folder import PARTIAL_SUFFIX
-from reports.store.io import WRITING, looks_ours, opened
+from reports.store.io import (
+    WRITING,
+    ChangedFileError,
+    EarlierFileError,
+    OpenFileError,
+    data_checksum,
+    data_seal,
+    looks_ours,
+    opened,
+    sealed,
+    write_whole,
+)
 from reports.store.runs import opened_run
 from reports.store.schema import FORMAT, FORMAT_VERSION, TABLE_FORMAT
+from reports.workers import executor
 
 Progress = Callable[[int, int], None]
 
@@ -22,6 +34,14 @@ PARTIAL = "partial"
 FOREIGN = "foreign"
 LEFTOVER = "leftover"
 OTHER = "other version"
+CHANGED = "changed"
+OPEN = "open"
+_HEAD = 512  # bytes of a file, which hold its seal
+
+_RISK = (
+    "it differs from its seal; reading such a file can crash the HDF5 library, so another process "
+    "read it"
+)
 
 
 @dataclass(frozen=True)
@@ -89,9 +109,52 @@ def _state(path: Path) -> FileState:
                     return FileState(
                         path, PARTIAL, f"{run.steps_done} steps are readable; {run.stopped}"
                     )
+    except EarlierFileError as error:
+        return FileState(path, OTHER, _said(error, path))
+    except OpenFileError as error:
+        return FileState(path, OPEN, _said(error, path))
+    except ChangedFileError:
+        return _changed(path)
     except RunFileError as error:
-        return FileState(path, DAMAGED, str(error).removeprefix(f"{path}: "))
+        return FileState(path, DAMAGED, _said(error, path))
     return FileState(path, WHOLE)
+
+
+def _said(error: Exception, path: Path) -> str:
+    return str(error).removeprefix(f"{path}: ")
+
+
+def _changed(path: Path) -> FileState:
+    """Return the state of a file that differs from its seal, read in a process of its own."""
+    try:
+        with executor(1) as others:
+            return others.submit(_compared, path).result()
+    except IapbError:
+        return FileState(path, DAMAGED, f"{_RISK}, and was killed")
+
+
+def _compared(path: Path) -> FileState:
+    """Return the state of a changed file: whether its data agree with their own checksum."""
+    try:
+        with path.open("rb") as begin:
+            stated = data_seal(begin.read(_HEAD))
+        with opened(path, None, changed=True) as file:
+            same = data_checksum(file, path) == stated
+            found = str(attribute_of(file, "format", ""))
+        if same and found == FORMAT:
+            with opened_run(path, changed=True):  # compares its content hash
+                pass
+    except (RunFileError, ValueError) as error:
+        return FileState(path, DAMAGED, f"{_RISK}: {_said(error, path)}")
+    if not same:
+        return FileState(path, DAMAGED, f"{_RISK}: its data differ from their checksum")
+    why = "attributes were added, the data are whole; `iapb store seal` seals it again"
+    return FileState(path, CHANGED, f"{_RISK}: {why}")
+
+
+def seal_again(state: FileState) -> None:
+    """Seal a changed file whose data are whole."""
+    write_whole(state.path, sealed(state.path.read_bytes()))
 
 
 def _head(path: Path) -> tuple[str, int]:

@@ -2,15 +2,18 @@
 checksum.
 
 A file is written under a temporary name, synced and renamed. Its seal is a checksum of the whole
-HDF5 content, appended after it. HDF5's own checksums cover only chunks of numbers and some
-metadata, and one wrong byte elsewhere can crash the HDF5 library (we have seen a double free, which
-ends the process). Therefore the seal is checked before the library opens the file. HDF5 and all
-software based on it ignore bytes after the end that the file states.
+HDF5 content and one of its data (datasets, and the attributes of a run), in HDF5's user block
+before it. HDF5's own checksums cover only chunks of numbers and
+some metadata, and one wrong byte elsewhere can crash the HDF5 library (we have seen a double free,
+which ends the process). Therefore the seal is checked before the library opens the file. HDF5 and
+all software based on it keep the user block as it is: opening a file for writing and closing it
+leaves it whole, and an attribute that is added makes it differ from its seal.
 """
 
 from __future__ import annotations
 
 import errno
+import fcntl
 import hashlib
 import os
 import re
@@ -25,19 +28,33 @@ from typing import Any
 import numpy as np
 
 from iapb.errors import IapbError, RunFileError
-from reference.hdf5 import attribute_of
-from reports.store.schema import FORMAT, FORMAT_VERSION, TABLE_FORMAT
+from reference.hdf5 import Budget, attribute_of, dataset_at
+from reports.store.schema import ATTRIBUTES, FORMAT, FORMAT_VERSION, TABLE_FORMAT
 
 WRITING = ".writing"  # suffix of a file that is not yet complete
 
-_MARK = b"\niapb sha256 "
-_SEAL = len(_MARK) + 64 + 1  # bytes: the mark, 64 hexadecimal digits, a newline
+_MARK = b"iapb sha256 "  # then the checksums of all bytes and of the data, 64 digits each
+_USER_BLOCK = 512  # bytes before the HDF5 content; HDF5 allows no fewer
+_MARK_AT_END = b"\niapb sha256 "  # of files up to format version 5, whose seal was at their end
+_SEAL_AT_END = len(_MARK_AT_END) + 64 + 1
 _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _FORMATS = (FORMAT, TABLE_FORMAT)
 _HEAD = 1 << 16  # bytes, among which the attributes of a file are
 _BLOCK = 1 << 20
 # Chunks of about this size: small enough to look at a part, large enough to compress.
 _CHUNK_BYTES = 1 << 17
+
+
+class ChangedFileError(RunFileError):
+    """A file of iapb differs from its seal."""
+
+
+class EarlierFileError(RunFileError):
+    """An earlier version of iapb wrote the file."""
+
+
+class OpenFileError(RunFileError):
+    """Another program holds the file open for writing."""
 
 
 def _sync(path: Path) -> None:
@@ -107,54 +124,109 @@ def write_whole(path: Path, content: str | bytes) -> None:
 
 
 def looks_ours(path: Path) -> bool:
-    """Return whether a file is ours or was so before it was damaged: it ends like a seal, or its
-    HDF5 head has our attributes."""
+    """Return whether a file is ours or was so before it was damaged: it has a seal, or its HDF5
+    head has our attributes."""
     head, end = _ends(path)
-    return end.startswith(_MARK) or (
-        head.startswith(_HDF5_SIGNATURE)
-        and b"\0format_version\0" in head
-        and any(name.encode() in head for name in _FORMATS)
+    return (
+        head.startswith(_MARK)
+        or end.startswith(_MARK_AT_END)
+        or (
+            head.startswith((_HDF5_SIGNATURE, bytes(_USER_BLOCK) + _HDF5_SIGNATURE))
+            and b"\0format_version\0" in head
+            and any(name.encode() in head for name in _FORMATS)
+        )
     )
 
 
 def _ends(path: Path) -> tuple[bytes, bytes]:
-    """Return the head of a file, and as many last bytes as a seal has."""
+    """Return the head of a file, and as many last bytes as a seal at the end had."""
     with path.open("rb") as file:
         head = file.read(_HEAD)
-        file.seek(max(path.stat().st_size - _SEAL, 0))
+        file.seek(max(path.stat().st_size - _SEAL_AT_END, 0))
         return head, file.read()
 
 
-def sealed(content: bytes) -> bytes:
-    """Return a file's content with its checksum appended."""
-    return content + _MARK + hashlib.sha256(content).hexdigest().encode() + b"\n"
+def sealed(content: bytes, data: str = "") -> bytes:
+    """Return HDF5 content behind a user block with its checksum and that of its data.
+
+    A user block that it has is replaced, and gives the checksum of the data.
+    """
+    if content.startswith(_MARK):
+        data = data or data_seal(content)
+        content = content[_USER_BLOCK:]
+    return _user_block(hashlib.sha256(content).hexdigest(), data) + content
+
+
+def _user_block(whole: str, data: str) -> bytes:
+    return f"{_MARK.decode()}{whole} {data}\n".encode().ljust(_USER_BLOCK, b"\0")
+
+
+def data_seal(head: bytes) -> str:
+    """Return the checksum of the data that a user block states."""
+    first = head[:_USER_BLOCK].partition(b"\n")[0]
+    return first.rpartition(b" ")[2].decode("ascii", "replace")
+
+
+def data_checksum(file: Any, path: Path) -> str:
+    """Return sha256 of all datasets, and of the attributes by which a run is read."""
+    import h5py
+
+    digest, budget, names = hashlib.sha256(), Budget(path, file), list[str]()
+    file.visititems(
+        lambda name, item: names.append(name) if isinstance(item, h5py.Dataset) else None
+    )
+    for name in ATTRIBUTES:
+        digest.update(f"{name} {attribute_of(file, name)!r}\n".encode())
+    for name in sorted(names):
+        dataset = dataset_at(file, name, budget)
+        digest.update(f"{name} {dataset.dtype.str} {dataset.shape}\n".encode())
+        for block in blocks(dataset) if dataset.shape else [np.asarray(dataset[()])]:
+            text = block.dtype.hasobject
+            digest.update(repr(block.tolist()).encode() if text else block.tobytes())
+    return digest.hexdigest()
 
 
 def _check_seal(path: Path) -> None:
     """Raise RunFileError unless `path` is an HDF5 file whose every byte agrees with its seal."""
-    head, mark = _ends(path)
-    if not head.startswith(_HDF5_SIGNATURE):
-        raise RunFileError(f"{path}: not an HDF5 file, or damaged at its beginning")
-    size = path.stat().st_size - _SEAL
-    if size < 0 or not mark.startswith(_MARK):
-        raise RunFileError(
-            f"{path}: no checksum at its end: the file was cut short, changed, or not written by "
-            f"iapb; "
-            "if it was a run, remove it to compute it again"
+    _require_closed(path)
+    head, end = _ends(path)
+    if head.startswith(_HDF5_SIGNATURE) and end.startswith(_MARK_AT_END):
+        raise EarlierFileError(
+            f"{path}: format version is 5 or less, of an earlier iapb: this one reads "
+            f"{FORMAT_VERSION}; simulate the run again, it will be stored beside this file"
         )
-    if mark != _MARK + _checksum(path, size).encode() + b"\n":
+    if not head.startswith(_MARK):
         raise RunFileError(
-            f"{path}: differs from its checksum, the file is damaged; remove it to compute it again"
+            f"{path}: no seal at its beginning: not written by iapb, or damaged there; if it was a "
+            "run, remove it to compute it again"
+        )
+    if head[:_USER_BLOCK] != _user_block(_checksum(path), data_seal(head)):
+        raise ChangedFileError(
+            f"{path}: differs from its seal: it was changed since iapb wrote it, or it is damaged; "
+            "`iapb store check` tells which"
         )
 
 
-def _checksum(path: Path, size: int) -> str:
-    """Return sha256 of the first `size` bytes."""
+def _require_closed(path: Path) -> None:
+    """Raise OpenFileError if another program holds a file open for writing; HDF5 locks it then."""
+    with path.open("rb") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise OpenFileError(
+                f"{path}: another program holds it open for writing; close it there first"
+            ) from None
+        except OSError:  # a file system without locks
+            return
+
+
+def _checksum(path: Path) -> str:
+    """Return sha256 of the bytes behind the user block."""
     digest = hashlib.sha256()
     with path.open("rb") as file:
-        while size > 0 and (block := file.read(min(_BLOCK, size))):
+        file.seek(_USER_BLOCK)
+        while block := file.read(_BLOCK):
             digest.update(block)
-            size -= len(block)
     return digest.hexdigest()
 
 
@@ -193,17 +265,24 @@ def new_file(path: Path, *, replace: bool) -> Iterator[Any]:
     import h5py
 
     with _noting_ctrl_c():
-        with h5py.File(path.name, "w", driver="core", backing_store=False) as file:
+        with h5py.File(
+            path.name, "w", driver="core", backing_store=False, userblock_size=_USER_BLOCK
+        ) as file:
             yield file
             file.flush()
+            data = data_checksum(file, path)
             image = file.id.get_file_image()
         with written_aside(path, replace=replace) as aside:
-            aside.write_bytes(sealed(image))
+            aside.write_bytes(sealed(image, data))
 
 
 @contextmanager
-def opened(path: Path | str, expected_format: str | None = FORMAT) -> Iterator[Any]:
+def opened(
+    path: Path | str, expected_format: str | None = FORMAT, changed: bool = False
+) -> Iterator[Any]:
     """Open a file of this project for reading; with `expected_format` None, any format is accepted.
+
+    changed : whether its bytes may differ from its seal; then the HDF5 library may crash
 
     Raises
     ------
@@ -223,7 +302,8 @@ def opened(path: Path | str, expected_format: str | None = FORMAT) -> Iterator[A
         )
         raise RunFileError(f"{path}: {what}")
     try:
-        _check_seal(path)
+        if not changed:
+            _check_seal(path)
         with h5py.File(path, "r", rdcc_nbytes=2 * _CHUNK_BYTES) as file:
             found = attribute_of(file, "format")
             if expected_format not in (None, found):

@@ -187,12 +187,13 @@ def opened_run(
     path: Path | str,
     read: Reader = dataset_at,
     budget: int | None = None,
+    changed: bool = False,
 ) -> Iterator[tuple[Run, RunEntry]]:
     """Yield a run whose arrays stay in its file, to be read in `blocks`, and the entry of the file.
 
-    The file is checked completely, in constant memory.
+    The file is checked completely, in constant memory. `changed`: see `io.opened`.
     """
-    with io.opened(path) as file:
+    with io.opened(path, changed=changed) as file:
         run, entry = _run_in(file, path, read, budget), _entry(file, path)
         _check(run)
         if content_hash(run) != entry.content_hash:

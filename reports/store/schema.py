@@ -31,8 +31,8 @@ from iapb.schema import Quantity, quantities
 FORMAT = "iapb run"
 TABLE_FORMAT = "iapb table"
 # 2: names and units of velocities, which quaternions need; 3: poses; 4: digests of M; 5: names of
-# energies, every
-FORMAT_VERSION = 5
+# energies, every; 6: the seal in the user block, time and q of impacts
+FORMAT_VERSION = 6
 
 # group -> its quantities, and the record that holds them
 GROUPS: dict[str, tuple[tuple[Quantity, ...], Callable[[Run], Any]]] = {
@@ -66,6 +66,23 @@ SENTENCES = (
     "remarks",
     "distrust",
 )  # lists of sentences, as JSON in attributes of the file; a file may lack them
+
+# attributes of a file by which it is read; others may be added
+ATTRIBUTES = (
+    "format",
+    "format_version",
+    "title",
+    "status",
+    "stopped",
+    "run_key",
+    "content_hash",
+    "dt",
+    "energies",
+    "every",
+    "tool_dofs",
+    "tool_coordinates",
+    *SENTENCES,
+)
 
 STATE_ATTRIBUTES = {
     "flag_values": np.arange(len(STATE_NAMES), dtype=np.int8),

@@ -52,7 +52,7 @@ def made_run(steps=20, contacts=7, impacts=3, seed=0, **fields):
         "step_edge": steps + 1,
         "contact": contacts,
         "impact": impacts,
-        "coordinate": 3,
+        "coordinate": len(fields.get("coordinate_names", "xyz")),
         "velocity": 3,
         "device_coordinate": device,
         "device_velocity": device,

@@ -186,7 +186,7 @@ def flipped(whole):
         (foreign, "not written by iapb"),
         (lambda whole: sealed(foreign(whole)), "expected 'iapb run'"),
         (flipped, "filter"),  # gzip's checksum
-        (partial(edited, move), "no checksum"),
+        (partial(edited, move), "differs from its seal"),
         (lambda whole: sealed(edited(move, whole)), "content hash"),
     ],
 )

@@ -1,5 +1,6 @@
 """Check of the store, and runs that come out the same again."""
 
+import hashlib
 import shutil
 from dataclasses import replace
 
@@ -15,11 +16,21 @@ from reports.evidence.runs import shipped_scene
 from reports.resimulate import differences, repeat_run
 from reports.runner import Runner
 from reports.store import content_hash, read_run, write_run
-from reports.store.check import DAMAGED, FOREIGN, LEFTOVER, PARTIAL, WHOLE, check_store
+from reports.store.check import (
+    CHANGED,
+    DAMAGED,
+    FOREIGN,
+    LEFTOVER,
+    OPEN,
+    OTHER,
+    PARTIAL,
+    WHOLE,
+    check_store,
+)
 from reports.store.io import sealed
-from reports.store.records import write_record
+from reports.store.records import read_record, write_record
 from reports.store.schema import FORMAT_VERSION, GROUPS, RESULT_GROUPS
-from tests.reports.made_up import flipped, made_run
+from tests.reports.made_up import made_run
 
 SHORT = {"duration": 0.05}
 
@@ -53,7 +64,8 @@ def test_every_kind_of_file_is_told_and_a_damaged_run_is_computed_again_where_it
     folder, (spoilt, whole) = filled / "runs", runs(filled)
     assert store("check", filled) == 0
     scene, run = shipped_scene("peg_corner", SHORT), read_run(spoilt)
-    spoilt.write_bytes(flipped(spoilt.read_bytes()))
+    with h5py.File(spoilt, "r+") as file:
+        move(file)
     write_run(whole.with_name("unfinished.h5.partial"), run)
     (folder / ".x.h5.1.writing").write_bytes(b"half")
     (folder / "text.h5").write_text("no HDF5")
@@ -76,6 +88,86 @@ def test_every_kind_of_file_is_told_and_a_damaged_run_is_computed_again_where_it
     assert content_hash(Runner(folder)(scene, run.world)) == content_hash(run) and spoilt.is_file()
     assert store("check", filled / "nowhere") == 1
     assert store("again", spoilt) == 0 and "the same to the last bit" in capsys.readouterr().out
+
+
+def add_attribute(file):
+    file.attrs["note"] = "mine"
+
+
+def move(file):
+    file["trajectory/q"][2, 1] += 1e-12
+
+
+def retell(file):
+    file["scene/source"][()] = "another scene"
+
+
+def slow_down(file):
+    file.attrs["dt"] = 1.0
+
+
+@pytest.mark.parametrize(
+    ("edit", "state"),
+    [
+        (lambda file: None, WHOLE),
+        (add_attribute, CHANGED),
+        (move, DAMAGED),
+        (retell, DAMAGED),
+        (slow_down, DAMAGED),
+        (lambda file: file["steps"].create_dataset("mine", data=1), DAMAGED),
+    ],
+)
+def test_what_another_program_writes_into_a_run_is_told_and_an_attribute_does_no_harm(
+    tmp_path, edit, state, capsys
+):
+    path, run = tmp_path / "run.h5", made_run()
+    write_run(path, run, provenance={})
+    with h5py.File(path, "r+") as file:
+        edit(file)
+    (found,) = check_store(path.parent)
+    assert found.state == state
+    if state == WHOLE:
+        assert content_hash(read_run(path)) == content_hash(run)
+        return
+    assert "another process read it" in found.why
+    with pytest.raises(RunFileError, match="differs from its seal.*iapb store check"):
+        read_run(path)
+    assert store("seal", path) == (state == DAMAGED)
+    said = capsys.readouterr().out
+    assert ("attributes were added, the data are whole" in said) == (state == CHANGED)
+    if state == CHANGED:
+        assert content_hash(read_run(path)) == content_hash(run)
+    assert check_store(path.parent)[0].state == (WHOLE if state == CHANGED else DAMAGED)
+
+
+def test_a_record_survives_an_attribute_too(tmp_path):
+    path = write_record(tmp_path / "table.h5", {"a": 1}, {})
+    with h5py.File(path, "r+") as file:
+        add_attribute(file)
+    assert store("seal", path) == 0 and read_record(path) == {"a": 1}
+
+
+def test_a_file_that_another_program_holds_open_is_not_damaged(tmp_path):
+    path = write_run(tmp_path / "run.h5", made_run(), provenance={})
+    with h5py.File(path, "r+") as file:
+        add_attribute(file)
+        file.flush()
+        assert [one.state for one in check_store(tmp_path)] == [OPEN]
+        with pytest.raises(RunFileError, match="another program holds it open"):
+            read_run(path)
+    with h5py.File(path):  # a reader disturbs nobody
+        assert [one.state for one in check_store(tmp_path)] == [CHANGED]
+
+
+def test_a_seal_at_the_end_is_of_an_earlier_version(tmp_path):
+    path = write_run(tmp_path / "run.h5", made_run(), provenance={})
+    content = path.read_bytes()[512:]
+    digest = hashlib.sha256(content).hexdigest()
+    path.write_bytes(content + f"\niapb sha256 {digest}\n".encode())
+    (found,) = check_store(tmp_path)
+    assert found.state == OTHER and "format version is 5 or less" in found.why
+    with pytest.raises(RunFileError, match="simulate the run again"):
+        read_run(path)
 
 
 @pytest.mark.parametrize("version", [FORMAT_VERSION - 1, FORMAT_VERSION + 1])

@@ -299,6 +299,8 @@ def test_mass_matrix_that_is_made_again_must_be_the_recorded_one(cradle: Run) ->
     """A configuration, a digest or the scene changed in the last bit: M is not the one whose digest
     is recorded."""
     table = cradle.impacts
+    assert np.array_equal(table.time, cradle.time[table.step])
+    assert np.array_equal(table.q, cradle.q[table.step])
     assert (
         table.mass_digest.all() and len(set(table.mass_digest)) == 1
     )  # M of balls does not depend on where they are
