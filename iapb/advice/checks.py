@@ -14,12 +14,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
+from iapb.advice.loops import MARGIN, SOON, HapticLoop, hold, nearest, scaled
 from iapb.advice.solids import joined, solids_of
 from iapb.compiled import block
 from iapb.contact import geometry, laws
@@ -27,6 +28,7 @@ from iapb.contact.kernels.narrow_phase import detect
 from iapb.names import in_metres
 from iapb.scene import Scene, SpatialScene, mechanism
 from iapb.scene.bodies import inertia_matrix
+from iapb.scene.model import MAX_RATE, Gains, Hand
 from iapb.scene.parts import STIFFEST
 from iapb.schema import Floats, Integers, zeros_of
 
@@ -40,6 +42,10 @@ THROWN = 1.0  # largest k = K Δt²/m at which a new contact returns no more ene
 ROUNDED = 1e-9  # relative rounding error of a limit
 # a joint may turn often, so only multiples of this many radians (seven turns) count as degrees
 MANY_TURNS = 45
+NEAREST = 8  # contacts of the tool, closest first, at which a haptic loop is checked
+FEWER = [0.96**n for n in range(1, 300)]  # factors of gains and of the step, in search of a limit
+MOVED = 0.1  # s: within which the hand gives the tool the speed that one step of a sensor must not
+SHAKEN = 0.1  # share of this speed that one step of the sensors may cause
 MANY_PAIRS = 2000  # with more pairs, only those closer than the largest body are checked
 
 
@@ -201,15 +207,29 @@ class Start:
 
     def applied(self, q: Floats) -> Floats:
         """Generalized force (d,) at q of gravity and of the hand's force at t = 0."""
-        force, hand = -self.mechanism.gravity(q, self.gravity), self.scene.hand
-        wrench = mechanism.wrench_of(self.scene, 0.0)
-        if hand is not None and wrench.any():
-            body = self.mechanism.index(hand.body)
+        return self.handed(q, 0.0) - self.mechanism.gravity(q, self.gravity)
+
+    def handed(self, q: Floats, time: float) -> Floats:
+        """Generalized force (d,) of the hand at q and at a time [s]."""
+        force, wrench = np.zeros(self.mechanism.nv), mechanism.wrench_of(self.scene, time)
+        if wrench.any():
+            body = self.mechanism.index(self.hand.body)
             R, p = self.mechanism.placements(q)
-            point = p[body] + R[body] @ np.array([*hand.point, 0.0][:3])
+            point = p[body] + R[body] @ np.array([*self.hand.point, 0.0][:3])
             force += wrench[:3] @ self.mechanism.point_jacobian(q, body, point)
             force += wrench[3:] @ self.mechanism.frame_jacobian(q, body)[3:]
         return force
+
+    @property
+    def hand(self) -> Hand:
+        """The hand; only a scene that has one asks for it."""
+        return cast(Hand, self.scene.hand)
+
+    @cached_property
+    def tool(self) -> slice:
+        """Range in v of the tree that the hand holds."""
+        tree = self.mechanism.tree_of_body[self.mechanism.index(self.hand.body)]
+        return slice(*self.mechanism.tree_dofs[tree])
 
     @cached_property
     def fall(self) -> Floats:
@@ -359,7 +379,9 @@ def _limits_at(start: Start, mobility: float, rows: Rows, most: float) -> StepLi
     )
 
 
-def check_scene(scene: Scene, law: laws.ContactLaw | None = None) -> tuple[Caution, ...]:
+def check_scene(
+    scene: Scene, law: laws.ContactLaw | None = None, coupling: str | None = None
+) -> tuple[Caution, ...]:
     """Find mistakes that would make a run of this scene meaningless, without running it.
 
     Parameters
@@ -367,6 +389,7 @@ def check_scene(scene: Scene, law: laws.ContactLaw | None = None) -> tuple[Cauti
     scene : Scene
     law : contact law; default `ImpulseAugmented()`. Fields that the law does not use are not
         checked.
+    coupling : name of the coupling, "none" for none; default: each that the scene gives gains for
 
     Returns
     -------
@@ -395,6 +418,9 @@ def check_scene(scene: Scene, law: laws.ContactLaw | None = None) -> tuple[Cauti
     frictionless = laws.IMPULSES in uses and laws.IMPACT_FRICTION not in uses
     if frictionless and scene.contact.self_collision_rows == "relative":
         found += _slips_through_impacts(start)
+    for name in ("four-channel", "unilateral") if scene.hand is not None else ():
+        if coupling in (None, name) and getattr(scene.couplings, name.replace("-", "_")):
+            found += _coupled(start, name)
     return tuple(found)
 
 
@@ -676,6 +702,130 @@ def _overdriven_friction(start: Start) -> Iterator[Caution]:
             "times beyond its limit μ N Δt = 2 m v_threshold: set contact.friction_velocity >= "
             f"{_up(contact.friction_velocity * worst / 2.0):g}, or contact.forces: implicit",
         )
+
+
+# Haptic loops
+
+
+def _coupled(start: Start, coupling: str) -> Iterator[Caution]:
+    """Warn of a coupling whose loop of tool and device grows by itself, or shakes them by the
+    resolution of the sensors."""
+    loops = _loops(start, coupling)
+    wrong = [where for where, loop in loops.items() if loop.grows]
+    if wrong:
+        yield _growing(start, coupling, loops, wrong[0])
+        return
+    device, loop = start.scene.device, next(iter(loops.values()))
+    times = start.hand.times(start.scene.duration)
+    inverse = np.linalg.inv(loop.mass)
+    hand = max(
+        force @ inverse @ force for force in (start.handed(start.q, t)[start.tool] for t in times)
+    )
+    if device is None or device.position_resolution is None or hand == 0.0:
+        return
+    kick = np.array(device.position_resolution) * (loop.stiffness * loop.dt + loop.damping)
+    share = math.sqrt(kick @ inverse @ kick / hand) / MOVED
+    if share > SHAKEN:
+        least = [_down(step * SHAKEN / share) for step in device.position_resolution]
+        yield Caution(
+            "sensors",
+            f"{coupling} coupling",
+            f"one step of the sensors changes the velocity, by the {coupling} coupling, by {share:.2g} of "
+            f"what the hand does in {MOVED:g} s: set device.position_resolution <= {_listed(least)}, or "
+            "smaller gains",
+        )
+
+
+def _growing(start: Start, coupling: str, loops: dict[str, HapticLoop], where: str) -> Caution:
+    """Return the warning of a loop that grows: where, by which limit, and what to set."""
+    every, loop, rate = [*loops.values()], loops[where], start.scene.rate
+    names, one = start.mechanism.velocity_names[start.tool], np.eye(len(loop.mass))
+
+    def holds(factors: dict[str, Any]) -> bool:
+        return hold(scaled(each, factors) for each in every)
+
+    alone = [i for i in range(len(one)) if holds(dict.fromkeys(MARGIN, 1.0 - one[i]))]
+    blamed = one[alone[0]] if alone else np.ones(len(one))
+    less = [1.0 - (1.0 - x) * blamed for x in FEWER]
+    tried = [
+        dict.fromkeys(fields, factor)
+        for fields in (("damping",), ("stiffness",), ("stiffness", "damping"))
+        if (factor := nearest(_scaling(holds, fields), less)) is not None
+    ]
+    path = f"couplings.{coupling.replace('-', '_')}"
+    remedies = [
+        " and ".join(
+            f"{path}.{name} <= {_listed(_down(x) for x in getattr(loop, name) * factor)}"
+            for name, factor in factors.items()
+        )
+        for factors in tried[:1]
+    ]
+    shorter = range(loop.delay - 1, -1, -1)
+    delay = nearest(lambda n: hold(replace(each, delay=n) for each in every), shorter)
+    remedies += [f"device.delay <= {delay}"] if delay is not None else []
+    steps = [x for x in FEWER if rate / x <= MAX_RATE]
+    step = nearest(lambda x: holds({"dt": x}), steps)
+    remedies += [f"rate >= {_up(rate / step):g} Hz"] if step is not None else []
+    return Caution(
+        "coupling",
+        f"{coupling} coupling",
+        f"the {coupling} coupling makes {names[alone[0]] if alone else 'tool and device'} swing "
+        f"ever more, {where}{_limit(loop)}: set {', or '.join(remedies) or 'smaller gains'}",
+    )
+
+
+def _scaling(holds: Callable[[dict[str, Any]], bool], fields: tuple[str, ...]) -> Any:
+    """Return the function that says whether loops hold with some fields multiplied by one
+    factor."""
+    return lambda factor: holds(dict.fromkeys(fields, factor))
+
+
+def _limit(loop: HapticLoop) -> str:
+    """Return the limit that a loop breaks, where a closed form says it."""
+    if loop.delay:
+        return f", with a delay of {loop.delay} step{'s' * (loop.delay > 1)} each way"
+    share = float((2.0 * loop.damping * loop.dt * np.diag(np.linalg.inv(loop.mass))).max())
+    return f", for B Δt/(m/2) = {share:.3g} is above its limit 2" if share >= 2.0 else ""
+
+
+def _loops(start: Start, coupling: str) -> dict[str, HapticLoop]:
+    """Return the loops of a coupling by where they act: in free motion, and at the tool's nearest
+    contacts.
+
+    What the tool touches counts as fixed.
+    """
+    scene, tool, contact = start.scene, start.tool, start.scene.contact
+    gains: Gains = getattr(scene.couplings, coupling.replace("-", "_"))
+    device: Any = scene.device
+    mass = start.mechanism.mass_matrix(start.q)[tool, tool]
+    damping = device.damping if device is not None else None
+    free = HapticLoop(
+        mass,
+        np.array(gains.stiffness),
+        np.array(gains.damping),
+        device_damping=np.array(damping or np.zeros(len(mass))),
+        joint_damping=mechanism.joint_damping_of(scene)[tool],
+        delay=device.delay if device is not None else 0,
+        dt=start.dt,
+        spring=np.zeros_like(mass),
+        damper=np.zeros_like(mass),
+        implicit=contact.forces != "paper",
+        reflects=coupling == "four-channel",
+    )
+    loops = {"in free motion": free}
+    if not free.reflects:  # it acts in contact, and a little before
+        loops = {"before the tool touches": replace(free, within=SOON)}
+    touched = [rows for rows in start.by_pair if start.rows[rows][:, tool].any()]
+    for rows in sorted(touched, key=lambda rows: float(start.found.gap[rows[0]]))[:NEAREST]:
+        J = start.rows[rows][:, tool]
+        wall = replace(free, spring=contact.stiffness * J.T @ J, damper=contact.damping * J.T @ J)
+        if not scaled(wall, dict.fromkeys(MARGIN, 0.0)).grows:  # else the contact is to blame
+            loops[f"while {start.names(rows)} touch"] = wall
+    return loops
+
+
+def _listed(values: Iterable[float]) -> str:
+    return f"[{', '.join(f'{x:g}' for x in values)}]"
 
 
 def _up(x: float, way: Callable[[float], int] = math.ceil, slack: float = 1.0 - ROUNDED) -> float:

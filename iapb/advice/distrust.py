@@ -35,6 +35,9 @@ STEADY = {
 }  # joints of trees whose motion has no such error
 DEEP = 0.5  # of the thinner shape: largest overlap of rigid bodies
 NARROW = 0.1  # of the body: a rigid body cannot pass a gap that is narrower by so much
+# of the energy at hand: most that a coupling may give tool and device. A sound one gives back some
+# that impacts took: by its delay, the device goes on, and springs back
+DRIVEN = 0.5
 OVERRUN = {
     "paper": 0.1,
     "implicit": 0.04,
@@ -59,6 +62,9 @@ def distrust_of(run: Run) -> tuple[str, ...]:
         seen = _Seen(run)
         if (seen.mechanism.nq, seen.mechanism.nv) != (run.q.shape[1], run.v.shape[1]):
             return ()  # the record's scene does not describe its bodies
+        driven = tuple(_driven(seen))
+        if driven:  # what the bodies then do follows from it
+            return driven
         reasons = (_energy, _sank, _passed, _squeezed, _flew, _overran, _spun)
         unsolved = [remark for remark in run.remarks if remark == UNSOLVED]
         return tuple(unsolved + [why for reason in reasons for why in reason(seen)])
@@ -218,6 +224,54 @@ def _at_hand(energy: dict[str, Floats]) -> float:
         float(np.abs(energy[name]).max(initial=0.0)) for name in ("hand_work", "coupling_work")
     )
     return float(energy["kinetic"][0] + energy["potential"][0] - energy["potential"].min()) + worked
+
+
+def _driven(seen: _Seen) -> Iterator[str]:
+    """Say whether coupling and actuators gave tool and device energy that neither start nor hand
+    explain.
+
+    The energy of the coupling's springs counts while it acts. A unilateral coupler moves the tool
+    where it does not act.
+    """
+    run, begin, tool = seen.run, seen.begin, slice(*seen.run.tool_dofs)
+    stiffness = np.array(run.coupling_settings.get("stiffness", ()))
+    known = "device_kinetic" in run.energy and len(stiffness) == run.device_v.shape[1]
+    if not known or run.steps <= begin:
+        return
+    tree = seen.mechanism.alone(seen.mechanism.tree_dofs.index(run.tool_dofs))
+    q, v = run.q[begin:, slice(*run.tool_coordinates)], run.v[begin:, tool]
+    apart = tree.displacements(np.stack([q, run.device_q[begin:]], axis=1).reshape(-1, q.shape[1]))
+    springs = np.diff(0.5 * apart[::2] ** 2 @ stiffness)
+    force = run.coupling_force[begin:, tool]
+    springs[~force.any(axis=1)] = 0.0
+    work = springs + _work(force, v, run.dt)
+    work += _work(run.device_force[begin:], run.device_v[begin:], run.dt)
+    given = _rise(work)
+    returned = _rise(_work(run.penalty_force[begin:, tool], v, run.dt)).max()
+    energy = run.energy
+    ports = [energy[name] for name in ("hand_work", "device_hand_work") if name in energy]
+    # a real hand moves a real device, and its work is not known: so the device's energy counts, too
+    at_hand = energy["kinetic"][0] + energy["device_kinetic"].max() + returned
+    at_hand += np.ptp(energy["potential"]) + sum(np.abs(work).max() for work in ports)
+    k = int(np.argmax(given))
+    if not given[k] <= DRIVEN * at_hand + seen.trifle(seen.mechanism.tree_of_body >= 0):
+        yield (
+            f"the {run.coupling} coupling and its actuators gave tool and device {given[k]:.3g} J by "
+            f"{run.time[begin + 1 + k]:.4g} s, where start, contacts and hand give {at_hand:.3g} J"
+        )
+
+
+def _work(force: Floats, v: Floats, dt: float) -> Floats:
+    """Return the work (n,) [J] of a force (n, d) in each step: by the mean velocity, it is a force's
+    share of kinetic energy."""
+    return np.asarray(0.5 * dt * np.einsum("nd,nd->n", force, v[1:] + v[:-1]), np.float64)
+
+
+def _rise(work: Floats) -> Floats:
+    """Return how far the sum of the works (n,) of the steps has risen above its least value
+    before."""
+    total = np.cumsum(work)
+    return np.asarray(total - np.minimum.accumulate(np.minimum(total, 0.0)), np.float64)
 
 
 def _spun(seen: _Seen) -> Iterator[str]:

@@ -218,11 +218,16 @@ class Hand(ScenePart):
     def largest_force(self, duration: float = 0.0) -> float:
         """Return the magnitude of the largest force [N] at t = 0, at the table's times and 200
         times of a function."""
-        times = [0.0, *(row[0] for row in self.force_table)]
-        times += [k * duration / 200.0 for k in range(201)] if self.force_function else []
         return max(
-            math.hypot(*force[: 2 if len(force) == 3 else 3]) for force in map(self.force_at, times)
+            math.hypot(*force[: 2 if len(force) == 3 else 3])
+            for force in map(self.force_at, self.times(duration))
         )
+
+    def times(self, duration: float = 0.0) -> list[float]:
+        """Return t = 0, the times of the table, and 200 times of a function within a duration
+        [s]."""
+        spread = [k * duration / 200.0 for k in range(201)] if self.force_function else []
+        return [0.0, *(row[0] for row in self.force_table), *spread]
 
 
 def _between(rows: tuple[tuple[float, ...], ...], time: float) -> list[float]:

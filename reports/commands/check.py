@@ -23,9 +23,11 @@ def check(
     then."""
     source, chosen = chosen_scene(scene_given(scene, set_))
     remarks = (*source.remarks, *chosen)
-    law = find_world(world).law
+    found = find_world(world)
+    law = found.law
     law = law.within(source) if hasattr(law, "within") else law
-    cautions, (said, refused) = check_scene(source, law), cost_in_words(source, law)
+    cautions = check_scene(source, law, found.coupling)
+    said, refused = cost_in_words(source, law)
     if refused:
         cautions = (*cautions, Caution("size", source.name, said))
     elif said:

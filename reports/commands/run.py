@@ -79,8 +79,9 @@ def run(
     Ctrl-C keeps the steps done, in a file that ends in .partial.
     """
     source, runner = scene_given(scene, set_), Runner(out)
-    law = find_world(world, rendering).law
-    cautions, (said, _) = check_scene(source, law), cost_in_words(source, law)
+    chosen = find_world(world, rendering)
+    law = chosen.law
+    cautions, (said, _) = check_scene(source, law, chosen.coupling), cost_in_words(source, law)
     if said:
         to_stderr(f"{source.name} in {world}: {said}.")
     for caution in cautions:
