@@ -83,7 +83,7 @@ def fields_of_our_engine(scene: Scene) -> tuple[str, ...]:
         found += [
             f"contact.{name}"
             for name in ("stiffness", "damping")
-            if scene.contact.forces != "paper" and name in scene.contact.model_fields_set
+            if scene.contact.forces != "paper" and not scene.contact.rigid
         ]
     return tuple(found)
 

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from iapb.advice.checks import chosen_scene
 from iapb.advice.effects import EFFECT_NAMES, Effect, active_names, decide_for
 from iapb.compiled import Entry, block
 from iapb.contact.geometry import ContactBuffer, contact_capacity
@@ -37,8 +36,6 @@ from iapb.schema import blank, quantities, zeros_of
 _factored = Entry(cholesky)
 
 _CONTACT_NUMBERS = (
-    "stiffness",
-    "damping",
     "friction_velocity",
     "approach_velocity",
     "cluster_distance",
@@ -51,8 +48,7 @@ class System:
 
     Attributes
     ----------
-    scene : Scene, with the stiffness and damping chosen for implicit contact
-    remarks : sentences on the chosen values
+    remarks : sentences on links that overlap at the start
     mechanism : Mechanism
     shapes, pairs : Shapes and their candidate pairs (k, 2); capacity : largest number of contacts
     tool_tree : int, index of the tree that the hand holds; −1 without a hand
@@ -65,13 +61,10 @@ class System:
     """
 
     def __init__(self, scene: Scene) -> None:
-        self.given = scene
-        self.scene, chosen = chosen_scene(scene)
-        self.remarks = (*scene.remarks, *chosen)
-        scene = self.scene
+        self.scene = scene
         self.mechanism: Mechanism = scene_parts.mechanism_of(scene)
         self.shapes = scene_parts.shapes_of(scene)
-        self.pairs = scene_parts.pairs_of(scene, self.shapes)
+        self.pairs, self.remarks = scene_parts.pairs_and_remarks(scene, self.shapes)
         self.stops = scene_parts.stops_of(scene, self.mechanism)
         self.capacity = contact_capacity(self.shapes, self.pairs) + len(self.stops.bound)
         self.joint_damping = scene_parts.joint_damping_of(scene)
@@ -164,9 +157,13 @@ class System:
                 tree_of_body=mechanism.tree_of_body,
                 tree_start=np.ascontiguousarray(ranges[:, 0]),
                 tree_stop=np.ascontiguousarray(ranges[:, 1]),
+                tree_mass=scene_parts.tree_masses(scene, mechanism),
                 switches=switches,
                 dt=self.dt,
                 gravity=self.gravity,
+                rigid=contact.rigid,
+                stiffness=contact.stiffness or 0.0,
+                damping=contact.damping or 0.0,
                 **{name: float(getattr(contact, name)) for name in _CONTACT_NUMBERS},
                 clamped=contact.penalty == "clamped",
                 friction_class=self.frictions.class_of_shape,

@@ -29,7 +29,6 @@ from iapb.names import in_metres
 from iapb.scene import Scene, SpatialScene, mechanism
 from iapb.scene.bodies import inertia_matrix
 from iapb.scene.model import MAX_RATE, Gains, Hand
-from iapb.scene.parts import STIFFEST
 from iapb.schema import Floats, Integers, zeros_of
 
 Rows = Integers  # numbers of contacts
@@ -46,6 +45,7 @@ NEAREST = 8  # contacts of the tool, closest first, at which a haptic loop is ch
 FEWER = [0.96**n for n in range(1, 300)]  # factors of gains and of the step, in search of a limit
 MOVED = 0.1  # s: within which the hand gives the tool the speed that one step of a sensor must not
 SHAKEN = 0.1  # share of this speed that one step of the sensors may cause
+_UNITS = {"stiffness": "N/m", "damping": "N s/m"}
 MANY_PAIRS = 2000  # with more pairs, only those closer than the largest body are checked
 
 
@@ -398,9 +398,9 @@ def check_scene(
     """
     chosen: Any = laws.ImpulseAugmented() if law is None else law
     chosen = chosen.within(scene) if hasattr(chosen, "within") else chosen
-    start, uses = Start(chosen_scene(scene)[0]), frozenset[str](getattr(chosen, "uses", ()))
+    start, uses = Start(scene), frozenset[str](getattr(chosen, "uses", ()))
     found = [*_degrees(scene), *_inertias(scene), *_overlaps(start), *_fast(start)]
-    if laws.PENALTY in uses:
+    if laws.PENALTY in uses and not scene.contact.rigid:
         found += _sags(start)
     integrator = getattr(chosen, "integrator", "semi_implicit_euler")
     if laws.PENALTY in uses and scene.contact.forces == "paper":
@@ -504,11 +504,8 @@ def _overlaps(start: Start) -> Iterator[Caution]:
                 f"{remedy}, or take the shape or the wall away",
             )
         else:
-            stored = (
-                0.5
-                * start.scene.contact.stiffness
-                * float(np.sum(np.minimum(found.gap[rows], 0.0) ** 2))
-            )
+            K = start.scene.contact.stiffness or 0.0
+            stored = 0.5 * K * float(np.sum(np.minimum(found.gap[rows], 0.0) ** 2))
             thrown = f"{stored:.3g} J in the contact's spring throw it out"
             says += thrown if start.scene.contact.forces == "paper" else "the contact pushes it out"
         yield Caution(kind, f"{a} and {b}", f"{says}{remedy}")
@@ -537,9 +534,9 @@ def _too_deep(start: Start, rows: Rows, resting: float) -> bool:
     depth, size, K = (
         -float(gap.min()),
         float(start.thickness[rows[0]]),
-        start.scene.contact.stiffness,
+        start.scene.contact.stiffness or 0.0,
     )
-    if depth * K <= 2.0 * resting:
+    if depth * K <= 2.0 * resting and K > 0.0:
         return False
     mass = 1.0 / max(float(np.max(np.sum(J * start.moved(J).T, axis=1))), 1e-300)
     kinetic, weight = (
@@ -838,48 +835,3 @@ def _up(x: float, way: Callable[[float], int] = math.ceil, slack: float = 1.0 - 
 
 def _down(x: float) -> float:
     return _up(x, math.floor, 1.0 + ROUNDED)
-
-
-# What `contact.forces: implicit` chooses
-
-SAG_ALLOWED, SAG_SHARE = (
-    1e-4,
-    1e-3,
-)  # m, and share of the smallest shape: largest static sag of implicit contact
-SPARE_LOAD = 10.0  # times the weight of everything that moves: levers and wedges can press harder
-# s: B/K, in which an overlap fades; a shorter one would throw what lands out of its first overlap
-RELAXATION = 0.1
-STANDARD_GRAVITY = 9.81  # m/s², for scenes with less
-_UNITS = {"stiffness": "N/m", "damping": "N s/m"}
-
-
-def chosen_scene(scene: Scene) -> tuple[Scene, tuple[str, ...]]:
-    """Return the scene with the stiffness and damping of implicit contact that it does not give,
-    and a remark on them.
-
-    A scene that gives both, or has the paper's forces, is unchanged, and there is no remark.
-    """
-    if not scene.chosen_fields:
-        return scene, ()
-    sag = min(
-        [
-            SAG_ALLOWED,
-            *(SAG_SHARE * solid.thin for solid in solids_of(mechanism.shapes_of(scene)).values()),
-        ]
-    )
-    load = sum(body.mass for body in scene.bodies) * max(
-        STANDARD_GRAVITY, math.hypot(*(scene.gravity or (0.0,)))
-    )
-    load += scene.hand.largest_force(scene.duration) if scene.hand is not None else 0.0
-    K, choice = scene.contact.stiffness, dict[str, float]()
-    if "stiffness" in scene.chosen_fields:
-        choice["stiffness"] = K = min(_up(SPARE_LOAD * load / sag), STIFFEST)
-    if "damping" in scene.chosen_fields:
-        choice["damping"] = min(_up(K * RELAXATION), STIFFEST)
-    contact = scene.contact.model_copy(update=choice)
-    contact._chosen = tuple(choice)
-    listed = ", ".join(f"{name} = {value:g} {_UNITS[name]}" for name, value in choice.items())
-    sags = f"; a load of {load:.3g} N sags by {in_metres(load / K)}" if K > 0.0 else ""
-    return scene.model_copy(update={"contact": contact}), (
-        f"chosen for implicit contact: {listed}{sags}",
-    )

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from iapb.advice.solids import Solid, joined, solids_of
+from iapb.contact.kernels.implicit import FADING
 from iapb.mechanics.energy import FORCES, energy_ledger, moved_straight
 from iapb.mechanics.joints import KINDS
 from iapb.mechanics.rotations import rotation_of
@@ -210,11 +211,24 @@ def _balance(
     contacts = seen.run.contacts
     rows = slice(*contacts.offsets[begin : begin + 2].tolist())
     gap = contacts.gap[rows][bodies[contacts.body_a[rows]]]
-    springs = 0.5 * (seen.scene.contact.stiffness or 0.0) * float(np.sum(np.minimum(gap, 0.0) ** 2))
+    springs = _in_overlaps(seen, np.minimum(gap, 0.0), bodies)
     total, at_hand = energy["kinetic"] + energy["potential"], _at_hand(energy) + springs
     excess = total[1:] - (total[0] + springs + energy["hand_work"] + energy["coupling_work"])
     friction = energy.get("friction_work", np.zeros(0))
     return _Book(name, friction, excess, at_hand, UNACCOUNTED * at_hand + seen.trifle(bodies))
+
+
+def _in_overlaps(seen: _Seen, gap: Floats, bodies: Booleans) -> float:
+    """Return the energy [J] that the overlaps of the first step may give the bodies.
+
+    A rigid contact lifts its bodies out of an overlap, no faster than the overlap fades.
+    """
+    if seen.scene.contact.stiffness is not None:
+        return 0.5 * seen.scene.contact.stiffness * float(np.sum(gap**2))
+    depth = -float(gap.min(initial=0.0))
+    mass = sum(body.mass for body, chosen in zip(seen.bodies, bodies, strict=True) if chosen)
+    speed, gravity = depth / (FADING * seen.run.dt), float(np.linalg.norm(seen.gravity))
+    return mass * (0.5 * speed**2 + gravity * depth)
 
 
 def _at_hand(energy: dict[str, Floats]) -> float:

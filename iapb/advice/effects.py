@@ -15,7 +15,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from iapb.advice.checks import chosen_scene
 from iapb.contact import laws
 from iapb.contact.geometry import Shapes, contact_capacity
 from iapb.haptics.coupling import Coupling
@@ -251,9 +250,13 @@ def _contact(
     """Return the rule of an effect that contacts ask for by a number of the contact section, unless
     it is zero."""
     return Rule(
-        lambda q: f"contact.{field} = {getattr(q.scene.contact, field):g} {unit}{more(q)}",
+        lambda q: (
+            f"the scene gives no contact.{field}: it follows from the masses that touch"
+            if getattr(q.scene.contact, field) is None
+            else f"contact.{field} = {getattr(q.scene.contact, field):g} {unit}{more(q)}"
+        ),
         left_out,
-        lambda q: "" if getattr(q.scene.contact, field) else f"contact.{field} = 0",
+        lambda q: f"contact.{field} = 0" if getattr(q.scene.contact, field) == 0.0 else "",
         (part,),
         None,
         ignores,
@@ -390,8 +393,7 @@ EFFECTS: dict[str, Rule] = {
         laws.PENALTY,
         "nothing would hold a body that rests on another",
         lambda q: (
-            (", implicit" if q.scene.contact.forces == "implicit" else ", explicit, equation (5)")
-            + ": chosen for small sags" * ("stiffness" in q.scene.contact.chosen)
+            ", implicit" if q.scene.contact.forces == "implicit" else ", explicit, equation (5)"
         ),
         "stiffness",
     ),
@@ -400,8 +402,7 @@ EFFECTS: dict[str, Rule] = {
         "N s/m",
         laws.PENALTY,
         "resting contacts would swing on their springs",
-        lambda q: ": chosen so that overlaps fade in 0.1 s" * ("damping" in q.scene.contact.chosen),
-        "damping",
+        ignores="damping",
     ),
     "friction": Rule(
         lambda q: _by_pair(q, "friction"),
@@ -506,7 +507,6 @@ def decide_effects(
         all effects in a fixed order, each with its state, the reason, and what would change without
         it.
     """
-    scene, _ = chosen_scene(scene)
     shapes = shapes_of(scene)
     return decide_for(
         scene, mechanism_of(scene), shapes, pairs_of(scene, shapes), law, coupling, rendering
@@ -522,8 +522,7 @@ def decide_for(
     coupling: Coupling | str | None,
     rendering: str | None = None,
 ) -> tuple[Effect, ...]:
-    """Do what `decide_effects` does for the scene of `chosen_scene` with its shapes and candidate
-    pairs (k, 2)."""
+    """Do what `decide_effects` does for a scene with its shapes and candidate pairs (k, 2)."""
     body_a, body_b = shapes.body[pairs.T]
     wall, same = body_b < 0, mechanism.tree_of_body[body_a] == mechanism.tree_of_body[body_b]
     to_walls, between, within = (int(each.sum()) for each in (wall, ~wall & ~same, ~wall & same))

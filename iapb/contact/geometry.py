@@ -80,6 +80,12 @@ class ContactBuffer(NamedTuple):
     friction_force: Annotated[Floats, "contact 3"]  # [N] on a
     mark: Annotated[States, "contact"]  # scratch of the clustering
     expected: Annotated[Floats, "contact"]  # [m] gap after the step if it were linear
+    sticks: Annotated[Booleans, "contact"]  # its points move together, by friction
+    point_a: Annotated[Floats, "contact 3"]  # [m] the point in the axes of body a
+    point_b: Annotated[Floats, "contact 3"]  # [m] the point in the axes of body b
+    slid: Annotated[Floats, "contact 3"]  # [m] Δt J v of the step
+    rolled: Annotated[Floats, "contact 3"]  # angle of a relative to b in the step, times the normal
+    drift: Annotated[Floats, "contact 3"]  # [m] a relative to b since they stick
 
 
 class Shape(NamedTuple):

@@ -12,8 +12,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from iapb.compiled import block
 from iapb.contact import geometry
 from iapb.contact.geometry import Shapes, candidate_pairs, frame_along, make_shapes
+from iapb.contact.kernels.contact_set import TOUCHING
+from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.world import Stops
 from iapb.errors import ArgumentError
 from iapb.linalg import product
@@ -24,7 +27,7 @@ from iapb.mechanics.rotations import rotation_of
 from iapb.scene.bodies import WORLD, inertia_matrix
 from iapb.scene.model import Scene, SpatialScene
 from iapb.scene.parts import SMALLEST_POSITIVE
-from iapb.schema import Floats, Indices, Integers
+from iapb.schema import Booleans, Floats, Indices, Integers, zeros_of
 
 Pairs = Indices
 
@@ -230,8 +233,15 @@ def pairs_of(scene: Scene, shapes: Shapes) -> Pairs:
     a moving body.
 
     Bodies of one tree are paired only with ``contact.self_collisions``. Rigidly connected bodies
-    and neighbours across one joint are never paired, because they touch by construction.
+    and neighbours across one joint are never paired, because they touch by construction. Nor are
+    those that overlap at the start.
     """
+    return pairs_and_remarks(scene, shapes)[0]
+
+
+def pairs_and_remarks(scene: Scene, shapes: Shapes) -> tuple[Pairs, tuple[str, ...]]:
+    """Return the pairs of `pairs_of`, and the scene's remarks with one on links that never touch,
+    since they overlap at the start."""
     tree: list[int] = []  # body -> first body of its tree
     part: list[int] = []  # body -> first body of its rigid part
     carrier: list[int] = []  # body -> rigid part that carries the joint of its own, -1 = the world
@@ -247,7 +257,33 @@ def pairs_of(scene: Scene, shapes: Shapes) -> Pairs:
     ]
     adjoining = (part_a == part_b) | (carrier_a == part_b) | (carrier_b == part_a)
     apart = (bodies < 0).any(axis=0) | (tree_a != tree_b)
-    return pairs[apart | (scene.contact.self_collisions & ~adjoining)]
+    links = ~apart & ~adjoining & scene.contact.self_collisions
+    overlapping = _overlapping_at_start(scene, shapes, pairs[links])
+    owners = [owner.name for _, owner, _ in _owned_shapes(scene)]
+    named = sorted({f"{owners[a]} and {owners[b]}" for a, b in pairs[links][overlapping]})
+    links[links] = ~overlapping
+    said = f"{', '.join(named)} overlap at the start: links of one tree, they never touch"
+    return pairs[apart | links], (*scene.remarks, *((said,) * bool(named)))
+
+
+def _overlapping_at_start(scene: Scene, shapes: Shapes, pairs: Pairs) -> Booleans:
+    """Return which of some pairs of shapes (k, 2) overlap in the pose of the start."""
+    if not len(pairs):
+        return np.zeros(0, np.bool_)
+    buffer = zeros_of(geometry.ContactBuffer, contact=geometry.contact_capacity(shapes, pairs))
+    placed = mechanism_of(scene).placements(start_of(scene)[0])
+    count = int(detect(block(shapes), pairs, *placed, -TOUCHING, block(buffer)))
+    found = set(zip(buffer.shape_a[:count].tolist(), buffer.shape_b[:count].tolist(), strict=True))
+    return np.array([tuple(pair) in found for pair in pairs.tolist()])
+
+
+def tree_masses(scene: Scene, mechanism: Mechanism) -> Floats:
+    """Return the mass [kg] of each tree; of one without mass, its largest moment of inertia."""
+    masses = np.array([body.mass for body in scene.bodies])
+    found = np.bincount(mechanism.tree_of_body, masses, minlength=len(mechanism.tree_dofs))
+    inertia = np.diagonal(mechanism.mass_matrix(start_of(scene)[0]))
+    turned = [inertia[slice(*dofs)].max(initial=0.0) for dofs in mechanism.tree_dofs]
+    return np.where(found > 0.0, found, turned)
 
 
 def stops_of(scene: Scene, mechanism: Mechanism) -> Stops:

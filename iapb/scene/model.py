@@ -20,6 +20,7 @@ from pydantic import (
     ValidationError,
     ValidationInfo,
     field_validator,
+    model_validator,
 )
 from pydantic.json_schema import models_json_schema
 
@@ -41,6 +42,7 @@ from iapb.scene.document import Document, yaml_text
 from iapb.scene.expressions import Expression, function_of
 from iapb.scene.parts import (
     MISSING,
+    STIFFEST,
     Fraction,
     Gain,
     Name,
@@ -66,6 +68,7 @@ MAX_RATE = 1e6  # Hz, a thousand times the haptic rate
 MAX_STEPS = 10_000_000  # in one simulation: 2.7 hours at 1 kHz; more is a mistake
 MAX_ROWS = 100_000  # rows of a hand's force over time
 MAX_DELAY = 1000  # steps
+RELAXATION = 0.1  # s: B/K where a scene gives K alone; an overlap fades in this time
 Mistakes = Iterator[tuple[Path, Any, str]]
 PerCoordinate = tuple[NonNegative, ...]
 Gravity = Annotated[V | None, Field(description="acceleration [m/s2], world axes; default: none")]
@@ -83,17 +86,18 @@ class Contact(ScenePart):
     forces: Literal["implicit", "paper"] = Field(
         "implicit",
         description="implicit (default): resting forces that no "
-        "stiffness or step makes unstable, Coulomb's friction, also in impacts, stiffness and "
-        "damping chosen for a sag "
-        "below 0.1 mm; paper: explicit (5) and (6), impacts without friction, K = 1000, B = 50; "
+        "stiffness or step makes unstable, Coulomb's friction, also in impacts, rigid unless the "
+        "scene gives a stiffness; paper: explicit (5) and (6), impacts without friction, K = 1000, B = 50; "
         "contact: paper is "
         "short for it",
     )
-    stiffness: Gain = Field(
-        1000.0, description="K of (5) [N/m]; default with forces: paper 1000, else chosen"
+    stiffness: Gain | None = Field(
+        default_factory=lambda given: 1000.0 if given.get("forces") == "paper" else None,
+        description="K of (5) [N/m]; default with forces: paper 1000, else the contact is rigid",
     )
-    damping: Gain = Field(
-        50.0, description="B of (5) [N s/m]; default with forces: paper 50, else chosen"
+    damping: Gain | None = Field(
+        default_factory=lambda given: _usual_damping(given),
+        description="B of (5) [N s/m]; default with forces: paper 50, else 0.1 s times stiffness",
     )
     penalty: Literal["clamped", "printed"] = Field(
         "clamped",
@@ -126,16 +130,37 @@ class Contact(ScenePart):
         "moving bodies: relative (12), default; per_body (13)-(14)",
     )
     self_collisions: Truth = Field(
-        False,
-        description="whether bodies of one tree, not neighbours in it, can touch; default false",
+        default_factory=lambda given: given.get("forces") != "paper",
+        description="whether bodies of one tree can touch, unless they are neighbours in it or "
+        "overlap at the start; default true, with forces: paper false",
     )
 
-    _chosen: tuple[str, ...] = PrivateAttr(())
-
     @property
-    def chosen(self) -> tuple[str, ...]:
-        """Fields whose values the toolkit has chosen."""
-        return self._chosen
+    def rigid(self) -> bool:
+        """Whether contacts are as rigid as their masses allow: the scene gives no stiffness."""
+        return self.stiffness is None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_null(cls, given: Any) -> Any:
+        """Leave out a stiffness or damping of null: the scene does not give it."""
+        if not isinstance(given, Mapping):
+            return given
+        gains = ("stiffness", "damping")
+        return {key: x for key, x in given.items() if x is not None or key not in gains}
+
+    @model_validator(mode="after")
+    def _stiff_where_damped(self) -> Self:
+        expected = "none without contact.stiffness, as forces are implicit"
+        require(self.stiffness is not None or self.damping is None, expected)
+        return self
+
+
+def _usual_damping(given: dict[str, Any]) -> float | None:
+    if given.get("forces") == "paper":
+        return 50.0
+    stiffness = given.get("stiffness")
+    return None if stiffness is None else min(RELAXATION * stiffness, STIFFEST)
 
 
 def _spelled_out(given: Any) -> Any:
@@ -367,12 +392,6 @@ class Scene(ScenePart):
         return self.hand is not None and bool(gains.four_channel or gains.unilateral)
 
     @property
-    def chosen_fields(self) -> tuple[str, ...]:
-        """Contact fields that the toolkit chooses, since the scene gives no value for them."""
-        fields = () if self.contact.forces == "paper" else ("stiffness", "damping")
-        return tuple(name for name in fields if name not in self.contact.model_fields_set)
-
-    @property
     def remarks(self) -> tuple[str, ...]:
         """Sentences on what the files of its robots say in vain, and on starts that were moved."""
         return self._remarks
@@ -401,13 +420,10 @@ class Scene(ScenePart):
 
     def resolved(self) -> dict[str, Any]:
         """Return every field with its value, defaults included, as plain numbers, texts, lists and
-        mappings.
-
-        Contact fields that the toolkit will choose have no value yet and are left out.
-        """
+        mappings."""
         plain = self.model_dump(mode="json")
-        for name in self.chosen_fields:
-            del plain["contact"][name]
+        if self.contact.rigid:  # not given, and other forces have other defaults
+            del plain["contact"]["stiffness"], plain["contact"]["damping"]
         return plain
 
     def with_values(self, values: dict[str, Any]) -> Self:

@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from iapb.advice.checks import Caution, Start, check_scene, chosen_scene, step_limits
+from iapb.advice.checks import Caution, Start, check_scene, step_limits
+from iapb.scene.mechanism import pairs_and_remarks, shapes_of
 from iapb.worlds import find_world
 from reports.commands.run import DISTRUSTED, SceneName, Values, cost_in_words, scene_given
 from reports.show import Answer, Json
@@ -21,8 +22,8 @@ def check(
 ) -> Answer:
     """Warn of problems that would make a run of SCENE worthless, with values to set; end with 3
     then."""
-    source, chosen = chosen_scene(scene_given(scene, set_))
-    remarks = (*source.remarks, *chosen)
+    source = scene_given(scene, set_)
+    remarks = pairs_and_remarks(source, shapes_of(source))[1]
     found = find_world(world)
     law = found.law
     law = law.within(source) if hasattr(law, "within") else law

@@ -184,10 +184,6 @@ def describe(run: Run, existed: bool) -> Iterator[str]:
         else ""
     )
     yield f"At the end: {', '.join(f'{run.coordinate_names[i]} {run.q[-1, i]:.6g}' for i in shown)}{more}."
-    yield from (
-        f"{remark}."
-        for remark in run.remarks
-        if not ("stiffness" in ignored and remark.startswith("chosen for implicit contact"))
-    )
+    yield from (f"{remark}." for remark in run.remarks)
     if run.distrust:
         yield f"This result is not to be trusted, because {'; '.join(run.distrust)}."

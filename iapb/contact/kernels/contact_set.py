@@ -18,6 +18,10 @@ ALIGNED_COSINE = 0.85
 # force is negligible.
 TOUCHING = 1e-12
 
+# A gap up to this [m] counts as closed where contact is rigid: a body that turns moves by less off
+# its support in a step, beyond what the step before shows.
+CLOSE = 1e-9
+
 _UNDECIDED, _KEPT, _DROPPED = 0, 1, 2  # marks while contacts are clustered
 
 # Marks in an impact under implicit contact: it strikes, it carries a load, it would strike but the
@@ -89,7 +93,7 @@ def cluster(world, contacts, count):
 
 
 @kernel
-def mark_new(contacts, count, previous, previous_count, distance):
+def mark_new(contacts, count, previous, previous_count, distance, rigid):
     """Write is_new from temporal coherence: by position, or by shapes and feature alone if
     `distance` is 0.
 
@@ -98,7 +102,8 @@ def mark_new(contacts, count, previous, previous_count, distance):
     speed) × (step). One previous contact may match several: a facet's edge that appears beside the
     facet is the same contact (paper III). A corner that slides along the floor into a wall is new,
     since the normals differ at the same point. A contact that only touched in the step before is
-    new, since no force has acted at it yet (balls of a cradle).
+    new, since no force has acted at it yet (balls of a cradle). A `rigid` one may carry a load
+    without an overlap.
 
     Contacts keep their order from step to step, so the search begins after the last match. The cost
     is linear in the contacts that last.
@@ -108,7 +113,8 @@ def mark_new(contacts, count, previous, previous_count, distance):
         contacts.is_new[i] = True
         for k in range(previous_count):
             j = begin + k if begin + k < previous_count else begin + k - previous_count
-            if previous.gap[j] < -TOUCHING and (
+            acted = previous.gap[j] < -TOUCHING or rigid and previous.normal_force[j] > 0.0
+            if acted and (
                 _same_name(contacts, i, previous, j)
                 or (
                     distance > 0.0

@@ -15,7 +15,9 @@ damped joints. Newton's method with a line search solves it, from the velocity b
 forces, which at rest is the answer. The limits of friction follow from the forces, so both are
 solved in turns; any limit c >= 0 dissipates. A gap that bends over the step (a ball in a drum, a
 slider on a turning arm) closes by ½ Δt² of an acceleration more than by Δt γ. What it closed more
-in the step before is added to γ in f; without this the contact would sink.
+in the step before is added to γ in f; without this the contact would sink. In the same way w gets what
+the points of a contact that sticks have moved apart on their arcs, and since they stick: they stay
+together to third order in the step.
 
 Where a gap is linear over the step, KE⁺ + Φ⁺ <= KE* + Φ with Φ = Σ ½ K min(φ, 0)², for every K, B
 >= 0 and Δt > 0 (`verification.proofs`). A solution that is not accurate enough to show this in
@@ -29,13 +31,26 @@ from typing import Annotated, NamedTuple
 
 from iapb.compiled import kernel
 from iapb.contact.kernels.contact_set import LEFT, TOUCHING, contact_before, group_of_contact
-from iapb.contact.kernels.rows import friction_of, tangent_of, write_pair_row
-from iapb.linalg import add, add_multiple, dot_of, load, scale, store
+from iapb.contact.kernels.rows import friction_of, tangent_of, twist, write_pair_row
+from iapb.linalg import (
+    add,
+    add_multiple,
+    cross,
+    dot,
+    dot_of,
+    load,
+    scale,
+    store,
+    subtract,
+    transform,
+    transform_back,
+)
 from iapb.schema import Floats, Integers
 
 STICKING = (
     1e-10  # m/s: a contact that slips more slowly sticks, with a friction in proportion to its slip
 )
+ROUNDED = 1e-14  # m: points that are this close are together
 EXACT = 1e-20  # share of the energy of a step that the open balance of momentum may give the bodies
 GOOD = 1e-14  # the same, where rounding allows no better
 ITERATIONS = 60  # of Newton's method for given limits of friction
@@ -46,6 +61,11 @@ FREE_TURNS = (
 DRY = -2  # in place of the first contact of a group that has joint friction alone
 SETTLED = 1e-3  # share of a limit of friction whose change ends the turns
 SEARCHES = 40  # evaluations of a line search
+# In units of Δt/m, m the heaviest tree of the group: what is left of rigid contact, so that forces
+# at redundant contacts are unique. A box sags by 4e-12 m at 1 kHz.
+COMPLIANCE = 1e-6
+LEAST_COMPLIANCE = 1e-12  # the same for the lightest tree; less is lost in rounding
+FADING = 100.0  # steps in which an overlap fades to 1/e; fewer would throw a body out of it
 GAIN = 1e-11  # share of the energy of a step that rounding may seem to create
 
 
@@ -66,8 +86,9 @@ class RestWork(NamedTuple):
     p: Annotated[Floats, "row"]  # impulses of the step [N s]
     limit: Annotated[Floats, "contact"]  # limits c = μ F_n Δt of friction [N s]
     bend: Annotated[
-        Floats, "contact"
-    ]  # what the gap closed or opened more than Δt J v in the step before, by Δt [m/s]
+        Floats, "row"
+    ]  # what a contact moved more than Δt J v in the step before, by Δt [m/s]
+    stiffness: Annotated[Floats, "1"]  # K of the group's contacts [N/m]
     first: Annotated[Integers, "tree"]  # first contact of each group, by its first tree, −1 = none
     next: Annotated[Integers, "contact"]  # contact of the same group that follows, −1 = none
     next_tree: Annotated[Integers, "tree"]  # tree of the same group that follows, −1 = none
@@ -152,18 +173,35 @@ def rest_group(world, state, group, s):
             size += 1
         t = work.next_tree[t]
     work.energy[0] = -1.0  # not known yet
+    work.stiffness[0], k = stiffness_of_group(world, work, group)
     count = gather_contacts(world, state, group, s)
-    k = world.stiffness * world.dt + world.damping
     solved = solve(world, state, size, count, s, k)
     for turn in range(TURNS if s > 1 else 0):
         if not follow_limits(world, state, count, s, 1.0 if turn < FREE_TURNS else 0.5):
             break
         solved = solve(world, state, size, count, s, k)
     if not solved:  # what bends is not in the energy that `guard` compares
-        work.bend[:count] = 0.0
+        work.bend[: count * s] = 0.0
         if not solve(world, state, size, count, s, k):
             guard(world, state, size, count, s)
     give_back(world, state, size, count, s)
+
+
+@kernel
+def stiffness_of_group(world, work, group):
+    """Return K [N/m] of a group's contacts, and k = K Δt + B [N s/m].
+
+    Where the scene gives none, k follows from the masses of the group's own trees alone.
+    """
+    if not world.rigid:
+        return world.stiffness, world.stiffness * world.dt + world.damping
+    heaviest, lightest, t = 0.0, math.inf, group
+    while t >= 0:
+        heaviest = max(heaviest, world.tree_mass[t])
+        lightest = min(lightest, world.tree_mass[t])
+        t = work.next_tree[t]
+    k = min(heaviest / COMPLIANCE, lightest / LEAST_COMPLIANCE) / world.dt
+    return k / ((1.0 + FADING) * world.dt), k
 
 
 @kernel
@@ -177,7 +215,7 @@ def gather_contacts(world, state, group, s):
         state.rest_work.first[group],
     )
     while i >= 0:
-        work.contact[count], work.limit[count], work.bend[count] = i, 0.0, 0.0
+        work.contact[count], work.limit[count] = i, 0.0
         trees = trees_of_contact(world, work, contacts, i, count)
         if trees[1] >= 0:
             high = work.offset[max(trees)]
@@ -187,15 +225,66 @@ def gather_contacts(world, state, group, s):
         for j in range(s):
             direction = n if j == 0 else tangent_of(n, j - 1, s - 1)
             write_pair_row(world, state, trees, i, direction, work.rows[count * s + j])
+            work.bend[count * s + j] = 0.0
         before = contact_before(state, i, begin)
+        store(contacts.drift, i, (0.0, 0.0, 0.0))
         if before >= 0:
             begin, force = before + 1, state.previous.normal_force[before]
             work.limit[count] = friction_of(world, contacts, i) * force * world.dt if s > 1 else 0.0
             bend = contacts.gap[i] - state.previous.expected[before]
             if force > 0.0 and abs(bend) > TOUCHING:
-                work.bend[count] = bend / world.dt
+                work.bend[count * s] = bend / world.dt
+            if force > 0.0 and s > 1:
+                follow_arc(world, state, before, i, count * s, s)
         count, i = count + 1, work.next[i]
     return count
+
+
+@kernel
+def material_point(state, body, x):
+    """Return the world point x in the axes of a body (−1: the world)."""
+    if body < 0:
+        return x
+    return transform_back(state.body.rotation, body, subtract(x, load(state.body.position, body)))
+
+
+@kernel
+def placed(state, body, x):
+    """Return a point given in the axes of a body (−1: the world) in the world."""
+    if body < 0:
+        return x
+    return add(load(state.body.position, body), transform(state.body.rotation, body, x))
+
+
+@kernel
+def moved_aside(state, before):
+    """Return how far the points that touched in the step before have moved apart in it [m].
+
+    Where one body rolls on the other, the points also part by the arc of a cycloid: the lift, times
+    a third of the angle, to third order. This is no slip.
+    """
+    old = state.previous
+    a, b, n = old.body_a[before], old.body_b[before], load(old.normal, before)
+    apart = subtract(
+        placed(state, a, load(old.point_a, before)), placed(state, b, load(old.point_b, before))
+    )
+    return subtract(apart, scale(dot(apart, n) / 3.0, load(old.rolled, before)))
+
+
+@kernel
+def follow_arc(world, state, before, i, row, s):
+    """Write to the rows of contact i how much faster its points slide than J v says, so far."""
+    moved, old = moved_aside(state, before), state.previous
+    aside = subtract(moved, load(old.slid, before))
+    if old.sticks[before]:
+        drift = add(load(old.drift, before), moved)
+        store(state.contacts.drift, i, drift)
+        aside = add(aside, drift)
+    if dot(aside, aside) > ROUNDED * ROUNDED:
+        n = load(state.contacts.normal, i)
+        for j in range(1, s):
+            bend = dot(aside, tangent_of(n, j - 1, s - 1)) / world.dt
+            state.rest_work.bend[row + j] = bend
 
 
 @kernel
@@ -264,13 +353,17 @@ def mass_form(world, state, size, v, w):
 
 
 @kernel
-def push(world, state, r, k, gamma):
-    """Return the normal impulse Δt f of contact r at the normal velocity γ, to which the bend of
-    the gap is added."""
+def speed_at(work, j, share):
+    """Return the velocity of row j at `share` of the present step, and its bend."""
+    return work.speed[j] + share * work.change[j] + work.bend[j]
+
+
+@kernel
+def push(world, state, r, s, k, share):
+    """Return the normal impulse Δt f of contact r at `share` of the present step."""
     work = state.rest_work
-    return world.dt * max(
-        0.0, -world.stiffness * state.contacts.gap[work.contact[r]] - k * (gamma + work.bend[r])
-    )
+    gap, gamma = state.contacts.gap[work.contact[r]], speed_at(work, r * s, share)
+    return world.dt * max(0.0, -work.stiffness[0] * gap - k * gamma)
 
 
 @kernel
@@ -279,7 +372,7 @@ def slide_length(work, r, s, share):
     STICKING)/c."""
     square = 0.0
     for j in range(r * s + 1, (r + 1) * s):
-        w = work.speed[j] + share * work.change[j]
+        w = speed_at(work, j, share)
         square += w * w
     size = math.sqrt(square)
     return size, max(size, STICKING) / work.limit[r] if work.limit[r] > 0.0 else math.inf
@@ -291,11 +384,11 @@ def set_impulses(world, state, count, s, k, share):
     work = state.rest_work
     for r in range(count):
         n = r * s
-        work.p[n] = push(world, state, r, k, work.speed[n] + share * work.change[n])
+        work.p[n] = push(world, state, r, s, k, share)
         if s > 1:
             _, divisor = slide_length(work, r, s, share)
             for j in range(n + 1, n + s):
-                work.p[j] = -(work.speed[j] + share * work.change[j]) / divisor
+                work.p[j] = -speed_at(work, j, share) / divisor
 
 
 @kernel
@@ -393,7 +486,8 @@ def newton_matrix(world, state, size, count, s, k):
             for h in range(n + 1, n + s):
                 factor = 1.0 / divisor if j == h else 0.0
                 if slip > STICKING:
-                    factor -= (work.speed[j] / slip) * (work.speed[h] / slip) / divisor
+                    along = speed_at(work, j, 0.0) / slip
+                    factor -= along * (speed_at(work, h, 0.0) / slip) / divisor
                 if factor != 0.0:
                     add_square(work, matrix, r, j, h, factor)
 
@@ -478,7 +572,7 @@ def is_quadratic(world, state, size, count, s, k):
             return False
     for r in range(count):
         j = r * s
-        if (work.p[j] > 0.0) != (push(world, state, r, k, work.speed[j] + work.change[j]) > 0.0):
+        if (work.p[j] > 0.0) != (push(world, state, r, s, k, 1.0) > 0.0):
             return False
         if (
             work.limit[r] > 0.0
@@ -538,7 +632,7 @@ def spring_energy(world, state, count, s, share):
     work, total = state.rest_work, 0.0
     for r in range(count):
         gap = min(0.0, state.contacts.gap[work.contact[r]] + share * world.dt * work.speed[r * s])
-        total += 0.5 * world.stiffness * gap * gap
+        total += 0.5 * work.stiffness[0] * gap * gap
     return total
 
 
@@ -563,6 +657,22 @@ def guard(world, state, size, count, s):
 
 
 @kernel
+def remember_points(world, state, r, s):
+    """Write what `moved_aside` needs of contact r: both points, Δt J v and the angle of rolling."""
+    work, contacts, i = state.rest_work, state.contacts, state.rest_work.contact[r]
+    x, n = load(contacts.point, i), load(contacts.normal, i)
+    store(contacts.point_a, i, material_point(state, contacts.body_a[i], x))
+    store(contacts.point_b, i, material_point(state, contacts.body_b[i], x))
+    _, _, omega_a = twist(world.mechanism, state.body, contacts.body_a[i], state.v)
+    _, _, omega_b = twist(world.mechanism, state.body, contacts.body_b[i], state.v)
+    store(contacts.rolled, i, scale(world.dt, cross(subtract(omega_a, omega_b), n)))
+    slid = scale(world.dt * work.speed[r * s], n)
+    for j in range(1, s):
+        slid = add(slid, scale(world.dt * work.speed[r * s + j], tangent_of(n, j - 1, s - 1)))
+    store(contacts.slid, i, slid)
+
+
+@kernel
 def give_back(world, state, size, count, s):
     """Write the group's velocity to v, and the forces to the contacts and the generalized
     forces."""
@@ -572,13 +682,21 @@ def give_back(world, state, size, count, s):
         pushed[i] = rubbed[i] = 0.0
         if world.switches.joint_friction:
             rubbed[i] = -dry_impulse(work, i, work.v[i]) / world.dt
+        state.v[work.dof[i]] = work.v[i]
     for r in range(count):
         i, force = work.contact[r], (0.0, 0.0, 0.0)
         contacts.normal_force[i] = work.p[r * s] / world.dt
         contacts.expected[i] = contacts.gap[i] + world.dt * work.speed[r * s]
         add_along_row(work, r, r * s, contacts.normal_force[i], pushed)
+        n = load(contacts.normal, i)
+        contacts.sticks[i] = (
+            s > 1
+            and contacts.normal_force[i] > 0.0
+            and slide_length(work, r, s, 0.0)[0] <= 10.0 * STICKING
+        )
+        if s > 1 and contacts.normal_force[i] > 0.0:
+            remember_points(world, state, r, s)
         if s > 1 and work.limit[r] > 0.0:
-            n = load(contacts.normal, i)
             for j in range(1, s):
                 size_of_force = work.p[r * s + j] / world.dt
                 force = add(force, scale(size_of_force, tangent_of(n, j - 1, s - 1)))
@@ -586,6 +704,5 @@ def give_back(world, state, size, count, s):
             store(contacts.friction_force, i, force)
     for i in range(size):
         k = work.dof[i]
-        state.v[k] = work.v[i]
         state.penalty_force[k] += pushed[i]
         state.friction_force[k] += rubbed[i]

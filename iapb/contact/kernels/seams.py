@@ -14,8 +14,6 @@ from iapb.linalg import add, dot, load, scale, store
 
 # [m] what must be left without the sag; above the rounding of positions, below a sag that matters
 _OVERLAPS = 1e-9
-# [m] well above the sag at the chosen stiffness; a deeper body has sunk into the next one, too
-_LARGEST_SAG = 5e-5
 _SAME_NORMAL = 1.0 - 5e-7  # cosine of 1e-3 rad: such a contact carries the body, too
 
 
@@ -52,20 +50,21 @@ def explained(world, state, i, count):
     resting contact."""
     contacts, n = state.contacts, load(state.contacts.normal, i)
     for j in range(count):
-        normal, sag, old = load(contacts.normal, j), 0.0, False
+        normal, sag = load(contacts.normal, j), 0.0
         if is_stop(contacts, j) or dot(n, normal) > _SAME_NORMAL:
             continue
-        for k in range(count):  # of this surface: the deepest contact, and whether one lasts
+        for k in range(count):  # the deepest contact of this surface
             if (
                 contacts.body_a[k] == contacts.body_a[j]
                 and contacts.body_b[k] == contacts.body_b[j]
                 and dot(load(contacts.normal, k), normal) > _SAME_NORMAL
             ):
-                sag, old = max(sag, -contacts.gap[k]), old or not contacts.is_new[k]
-        if not old or sag > _LARGEST_SAG:
-            continue
-        for body, sign in ((contacts.body_a[j], 1.0), (contacts.body_b[j], -1.0)):
-            if body >= 0 and (body == contacts.body_a[i] or body == contacts.body_b[i]):
+                sag = max(sag, -contacts.gap[k])
+        for body, other, sign in (
+            (contacts.body_a[j], contacts.body_b[j], 1.0),
+            (contacts.body_b[j], contacts.body_a[j], -1.0),
+        ):
+            if body >= 0 and joins(contacts, i, body, other):
                 here = load(state.body.position, body)
                 store(state.body.position, body, add(here, scale(sign * sag, normal)))
                 apart = is_apart(world, state, contacts.shape_a[i], contacts.shape_b[i])
@@ -73,6 +72,13 @@ def explained(world, state, i, count):
                 if apart:
                     return True
     return False
+
+
+@kernel
+def joins(contacts, i, body, other):
+    """Whether contact i is one of these two bodies: walls that join are all the world."""
+    a, b = contacts.body_a[i], contacts.body_b[i]
+    return (a == body and b == other) or (a == other and b == body)
 
 
 @kernel

@@ -21,7 +21,14 @@ from __future__ import annotations
 from iapb.compiled import copy_into, kernel
 from iapb.contact.kernels.broadphase import near_pairs
 from iapb.contact.kernels.collide import resolve_collisions
-from iapb.contact.kernels.contact_set import TOUCHING, classify, cluster, group_of_contact, mark_new
+from iapb.contact.kernels.contact_set import (
+    CLOSE,
+    TOUCHING,
+    classify,
+    cluster,
+    group_of_contact,
+    mark_new,
+)
 from iapb.contact.kernels.implicit import is_dry, rest_implicitly
 from iapb.contact.kernels.joint_stops import add_stops
 from iapb.contact.kernels.narrow_phase import detect
@@ -34,6 +41,7 @@ from iapb.linalg import (
     add_multiple,
     cholesky,
     cholesky_tree_blocks,
+    load,
     scale,
     solve_mass,
     solve_tree_blocks,
@@ -125,6 +133,13 @@ def find_contacts(world, state):
     ):  # `mark_new` and friction compare with those of the last step
         copy_contact(before, i, now, i)
         before.normal_force[i], before.expected[i] = now.normal_force[i], now.expected[i]
+        before.sticks[i] = now.sticks[i]
+        if world.switches.implicit_contact and world.switches.friction:
+            store(before.point_a, i, load(now.point_a, i))
+            store(before.point_b, i, load(now.point_b, i))
+            store(before.slid, i, load(now.slid, i))
+            store(before.rolled, i, load(now.rolled, i))
+            store(before.drift, i, load(now.drift, i))
     state.contact_count[1] = state.contact_count[0]
     count = present_contacts(world, state, now)
     if count < 0:
@@ -132,7 +147,7 @@ def find_contacts(world, state):
     state.contact_count[0] = count
     state.contact_impulse[:count] = 0.0
     contact_velocities(world.mechanism, state.body, state.v, now, count)
-    mark_new(now, count, before, state.contact_count[1], world.coherence_distance)
+    mark_new(now, count, before, state.contact_count[1], world.coherence_distance, world.rigid)
     if world.switches.supports:
         count = state.contact_count[0] = leave_out_seams(world, state, count)
     classify(world, state, count)
@@ -144,9 +159,10 @@ def present_contacts(world, state, contacts):
     """Find, cluster and complete the contacts of the present configuration; return how many, -1:
     too many."""
     R, p, pairs = state.body.rotation, state.body.position, world.pairs
-    margin = (
-        TOUCHING if world.switches.implicit_contact else 0.0
-    )  # all corners of a face that touches, whatever its rounding
+    # all corners of a face that touches, whatever its rounding, or the bend of a rigid contact
+    margin = TOUCHING if world.switches.implicit_contact else 0.0
+    if world.rigid:
+        margin = CLOSE
     if world.broad_phase.used:
         near = near_pairs(world.broad_phase, R, p, margin)
         if near < 0:

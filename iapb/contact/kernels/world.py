@@ -65,9 +65,11 @@ class World(NamedTuple):
     tree_of_body: np.ndarray  # (n,) int64
     tree_start: np.ndarray  # (t,) first dof of each tree
     tree_stop: np.ndarray  # (t,)
+    tree_mass: np.ndarray  # (t,) mass of its bodies [kg]
     switches: Switches
     dt: float  # [s]
     gravity: np.ndarray  # (3,) [m/s²]
+    rigid: bool  # the masses of a group give its K and B; else the scene does
     stiffness: float  # K [N/m] (5)
     damping: float  # B [N s/m] (5)
     tangents: int  # of a contact: 1 in the plane, 2 in space

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from iapb.advice.checks import Start, check_scene, chosen_scene, step_limits
+from iapb.advice.checks import Start, check_scene, step_limits
 from iapb.contact.laws import ImpulseAugmented
 from iapb.scene import Scene, SpatialScene, find_scene, load_scene, scene_names
 from iapb.simulation import simulate
@@ -317,16 +317,3 @@ walls:
 
 
 # What implicit contact chooses
-
-
-@pytest.mark.parametrize(
-    ("contact", "stiffness", "damping"),
-    [({}, 990000.0, 99000.0), ({"stiffness": 2e4}, 2e4, 2000.0)],
-)
-def test_implicit_contact_holds_ten_times_all_weight_at_a_tenth_of_a_millimetre(
-    contact: dict[str, Any], stiffness: float, damping: float
-) -> None:
-    """10 m g over 0.1 mm, rounded up to two digits; an overlap fades in 0.1 s."""
-    chosen, (said,) = chosen_scene(scene(box(), forces="implicit", **contact))
-    assert (chosen.contact.stiffness, chosen.contact.damping) == (stiffness, damping)
-    assert said.startswith("chosen for implicit contact") and "a load of 9.81 N sags" in said

@@ -25,6 +25,7 @@ CHAIN = {
             "parent": parent,
             "joint": "revolute",
             "inertia": 1,
+            "origin": [3 * (parent != "world"), 0],
             "shapes": [{"kind": "circle", "radius": 1}],
         }
         for name, parent in (("one", "world"), ("two", "one"), ("three", "two"))

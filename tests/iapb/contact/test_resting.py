@@ -241,5 +241,7 @@ def test_friction_takes_energy_whether_or_not_its_limits_have_settled(
     )
     run = simulate(scene, Penalty())
     for after, force in zip(run.v[1:], run.friction_force, strict=True):
-        assert force @ after <= 1e-12 * np.abs(force) @ np.abs(after)
+        # what sticks follows the arc of its step, and J v the tangent: an angle of |ω| Δt
+        turned = np.abs(after.reshape(-1, 6)[:, 3:]).max() * run.dt
+        assert force @ after <= turned * np.abs(force) @ np.abs(after)
     assert run.friction_force.any()

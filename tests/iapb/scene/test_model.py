@@ -29,9 +29,7 @@ def test_a_scene_keeps_its_text_and_reads_yaml_numbers_and_aliases() -> None:
         1e-3,
     )
     assert scene.source_text == text and scene.hand is not None and scene.hand.point == (0.0, 1.0)
-    assert not {"stiffness", "damping"} & set(
-        scene.resolved()["contact"]
-    )  # the toolkit will choose them
+    assert scene.contact.rigid and not {"stiffness", "damping"} & {*scene.resolved()["contact"]}
 
 
 @given(st.floats(0.0, 1e9), st.floats(-1e9, 1e9), st.floats(0.0, 1.0))

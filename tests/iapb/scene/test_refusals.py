@@ -119,8 +119,8 @@ IN_THE_PLANE: dict[str, list[Any]] = {
         [[math.cos(4 * math.pi * k / 5), math.sin(4 * math.pi * k / 5)] for k in range(5)],
     ],  # a pentagram
     "contact.forces": ["explicit", None],
-    "contact.stiffness": [value for value in NEGATIVE if value != 1e10] + [1.1e15],
-    "contact.damping": [value for value in NEGATIVE if value != 1e10] + [1.1e15],
+    "contact.stiffness": [value for value in OWN if value != 1e10] + [1.1e15],
+    "contact.damping": [value for value in OWN if value != 1e10] + [1.1e15],
     "contact.penalty": ["soft", None, True],
     "contact.restitution": [*NEGATIVE, 1.001],
     "contact.self_collision_rows": ["both", None],
