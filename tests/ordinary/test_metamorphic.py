@@ -181,10 +181,11 @@ SAME: Place = (1.0, HERE, PLANE)
 # name: change, its place, and the largest difference in shares of the size. Sums in another order
 # differ by rounding, 1e-16 of the size. Limits of friction are settled to 1e-3 of themselves, from
 # a start that the last step gives, so a rounding can move a slip by that share of a step's: 1e-6.
+# Two walls at one place share such a limit, and each half settles by itself: 1e-4.
 # A kilometre rounds positions to 1e-13 m, and touch itself by as much.
 CHANGES: dict[str, tuple[Callable[[Values], Values], Place, float]] = {
     "reordered and renamed": (reordered, SAME, 1e-6),
-    "each wall twice": (twice, SAME, 1e-6),
+    "each wall twice": (twice, SAME, 1e-4),
     "floor in two": (in_two, SAME, 1e-6),
     "a light body far away": (beside(1e-3), SAME, 0.0),
     "a heavy body far away": (beside(1e6), SAME, 0.0),
@@ -201,8 +202,15 @@ def plain() -> dict[str, dict[str, np.ndarray]]:
     return {}
 
 
-@pytest.mark.parametrize("change", CHANGES)
-@pytest.mark.parametrize("name", SCENES)
+# every pair of a scene and a change; one of six by default
+PAIRS = [
+    pytest.param(name, change, marks=[] if (i + k) % 6 == 0 else pytest.mark.thorough)
+    for i, name in enumerate(SCENES)
+    for k, change in enumerate(CHANGES)
+]
+
+
+@pytest.mark.parametrize(("name", "change"), PAIRS)
 def test_a_change_that_means_nothing_changes_nothing(
     name: str, change: str, plain: dict[str, dict[str, np.ndarray]]
 ) -> None:
@@ -210,6 +218,8 @@ def test_a_change_that_means_nothing_changes_nothing(
     how, place, most = CHANGES[change]
     if values.get("dimensions") == 3 and place[2] is not PLANE:
         pytest.skip("turns and mirrors are in the plane")
+    if name == "heavy_box_rests" and place[0] != 1.0:
+        pytest.skip("numbers of a scene are at most 1e9")
     if name not in plain:
         plain[name] = ends(values)
     found, size = ends(placed(how(values), *place)), size_of(values)

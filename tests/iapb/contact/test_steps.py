@@ -493,14 +493,14 @@ class Step:
             arc = (moved - slid + (0.0 if drift is None else drift)) / h
             slip = slip + arc - (arc @ c.normal) * c.normal
             sticks = np.linalg.norm(drag) < 0.99 * limit
-            slow = np.linalg.norm(slip) < 20.0 * STICKS + 0.01 * np.linalg.norm(arc)
+            slow = np.linalg.norm(slip) < 20.0 * STICKS + 0.05 * np.linalg.norm(arc)
             if normal > 0.0:
                 drift = (np.zeros(3) if drift is None else drift) if slow else None
                 self.sticks[c.name] = self.parting(c), h * J @ after, drift, sticks or not slow
             if not certain:  # at the limit, it may have stuck or slid
                 continue
             if sticks:
-                assert np.linalg.norm(slip) <= STICKS + 0.01 * np.linalg.norm(arc)
+                assert np.linalg.norm(slip) <= STICKS + 0.05 * np.linalg.norm(arc)
             elif not slow:
                 np.testing.assert_allclose(
                     drag, -limit * slip / np.linalg.norm(slip), atol=2e-2 * limit
@@ -516,7 +516,10 @@ class Step:
                 np.testing.assert_allclose(lost, -damped * after, atol=1e-9)
         else:
             np.testing.assert_allclose(lost, 0.0, atol=1e-6)
-            assert self.run.friction_force[self.k] @ after <= 1e-9 or given.forces == "paper"
+            # points that touch follow arcs, J v their tangents: an angle of |ω| Δt
+            drag, turned = self.run.friction_force[self.k], h * np.abs(after).max()
+            most = 1e-9 + turned * np.abs(drag) @ np.abs(after)
+            assert drag @ after <= most or given.forces == "paper"
 
     def parting(self, c: paper.Contact) -> Callable[[np.ndarray], np.ndarray]:
         """Return how far the points that touch now are apart at another q."""
