@@ -361,10 +361,10 @@ def step_limits(start: Start) -> StepLimits | None:
 
 def _limits_at(start: Start, mobility: float, rows: Rows, most: float) -> StepLimits:
     """Return the limits at contacts (c,) of a mobility [1/kg]: k + 2 b <= 4, and k <= `most`."""
-    dt, contact = start.dt, start.scene.contact
+    dt, (K, B) = start.dt, start.scene.contact.gains
     stable = 4.0 * (1.0 + ROUNDED)
-    k = contact.stiffness * mobility * dt**2
-    b = contact.damping * mobility * dt
+    k = K * mobility * dt**2
+    b = B * mobility * dt
     stiffness = min(most, max(0.0, stable - 2.0 * b))
     damping = max(0.0, 0.5 * (stable - k))
     # A step of Δt/y has k/y² and b/y, so it is stable from the root of 4 y² - 2 b y - k on.
@@ -504,7 +504,7 @@ def _overlaps(start: Start) -> Iterator[Caution]:
                 f"{remedy}, or take the shape or the wall away",
             )
         else:
-            K = start.scene.contact.stiffness or 0.0
+            K, _ = start.scene.contact.gains
             stored = 0.5 * K * float(np.sum(np.minimum(found.gap[rows], 0.0) ** 2))
             thrown = f"{stored:.3g} J in the contact's spring throw it out"
             says += thrown if start.scene.contact.forces == "paper" else "the contact pushes it out"
@@ -534,7 +534,7 @@ def _too_deep(start: Start, rows: Rows, resting: float) -> bool:
     depth, size, K = (
         -float(gap.min()),
         float(start.thickness[rows[0]]),
-        start.scene.contact.stiffness or 0.0,
+        start.scene.contact.gains[0],
     )
     if depth * K <= 2.0 * resting and K > 0.0:
         return False
@@ -633,14 +633,10 @@ def _slips_through_impacts(start: Start) -> Iterator[Caution]:
 def _too_stiff(start: Start) -> Iterator[Caution]:
     """Warn of stiffness or damping beyond the stable limits of the step."""
     limits, contact = step_limits(start), start.scene.contact
-    if limits is None or (
-        contact.stiffness <= limits.stiffness and contact.damping <= limits.damping
-    ):
+    K, B = contact.gains
+    if limits is None or (K <= limits.stiffness and B <= limits.damping):
         return
-    by_damping = (
-        limits.damping > 0.0
-        and contact.damping * limits.stiffness > contact.stiffness * limits.damping
-    )
+    by_damping = limits.damping > 0.0 and B * limits.stiffness > K * limits.damping
     field = "damping" if limits.stiffness == 0.0 or by_damping else "stiffness"
     yield Caution(
         field,
@@ -656,7 +652,7 @@ def _too_stiff(start: Start) -> Iterator[Caution]:
 def _sags(start: Start) -> Iterator[Caution]:
     """Warn of static loads that sag by more than a tenth: of a shape at a contact, of the range at
     a joint limit."""
-    K, stops, found = start.scene.contact.stiffness, start.stops, [(0.0, -1)]
+    (K, _), stops, found = start.scene.contact.gains, start.stops, [(0.0, -1)]
     for rows in start.supports if K > 0.0 else ():
         shares = start.loads(rows) / (K * start.thickness[rows])
         found.append((float(shares.max()), int(rows[shares.argmax()])))

@@ -140,6 +140,11 @@ class Contact(ScenePart):
         """Whether contacts are as rigid as their masses allow: the scene gives no stiffness."""
         return self.stiffness is None
 
+    @property
+    def gains(self) -> tuple[float, float]:
+        """K [N/m] and B [N s/m] of (5); zeros where contact is rigid."""
+        return self.stiffness or 0.0, self.damping or 0.0
+
     @model_validator(mode="before")
     @classmethod
     def _without_null(cls, given: Any) -> Any:

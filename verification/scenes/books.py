@@ -202,14 +202,15 @@ def contact_energy(run: Run, scene: Scene) -> tuple[Floats, Floats, float]:
     contacts = run.contacts
     step = np.repeat(np.arange(run.steps), np.diff(contacts.offsets))
     overlap = np.maximum(-contacts.gap, 0.0)
-    spring = scene.contact.stiffness * overlap
+    stiffness, damping = scene.contact.gains
+    spring = stiffness * overlap
     # Spring and damper act if they push, or if the damper cancels the spring. In a colliding group
     # the impulse acts instead of both. The damper is limited if it would pull more than the spring
     # pushes.
-    cancelled = spring <= scene.contact.damping * contacts.normal_velocity
+    cancelled = spring <= damping * contacts.normal_velocity
     acts = (contacts.normal_force != 0.0) | cancelled
     damper = np.where(acts, contacts.normal_force - spring, 0.0)
-    held = np.bincount(step, 0.5 * scene.contact.stiffness * overlap**2 * acts, minlength=run.steps)
+    held = np.bincount(step, 0.5 * stiffness * overlap**2 * acts, minlength=run.steps)
     apart = separations(run, scene, step)
     work = np.bincount(step, damper * apart, minlength=run.steps)
     pushed = float(np.dot(contacts.normal_force, apart))
