@@ -24,6 +24,7 @@ from iapb.advice.loops import MARGIN, SOON, HapticLoop, hold, nearest, scaled
 from iapb.advice.solids import joined, solids_of
 from iapb.compiled import block
 from iapb.contact import geometry, laws
+from iapb.contact.kernels.implicit import COMPLIANCE, FADING
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.names import in_metres
 from iapb.scene import Scene, SpatialScene, mechanism
@@ -805,13 +806,18 @@ def _loops(start: Start, coupling: str) -> dict[str, HapticLoop]:
         implicit=contact.forces != "paper",
         reflects=coupling == "four-channel",
     )
+    K, B = contact.gains
+    if contact.rigid:  # as `iapb.contact.kernels.implicit` chooses it
+        soft = sum(body.mass for body in scene.bodies) / (COMPLIANCE * start.dt)
+        K = soft / ((1.0 + FADING) * start.dt)
+        B = soft - K * start.dt
     loops = {"in free motion": free}
     if not free.reflects:  # it acts in contact, and a little before
         loops = {"before the tool touches": replace(free, within=SOON)}
     touched = [rows for rows in start.by_pair if start.rows[rows][:, tool].any()]
     for rows in sorted(touched, key=lambda rows: float(start.found.gap[rows[0]]))[:NEAREST]:
         J = start.rows[rows][:, tool]
-        wall = replace(free, spring=contact.stiffness * J.T @ J, damper=contact.damping * J.T @ J)
+        wall = replace(free, spring=K * J.T @ J, damper=B * J.T @ J)
         if not scaled(wall, dict.fromkeys(MARGIN, 0.0)).grows:  # else the contact is to blame
             loops[f"while {start.names(rows)} touch"] = wall
     return loops
