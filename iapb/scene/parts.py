@@ -74,6 +74,10 @@ class _Missing:
 MISSING = _Missing()
 
 
+def _is_short(error: Any) -> bool:
+    return len(error["input"]) < int(error["ctx"]["min_length"])
+
+
 class ScenePart(BaseModel):
     """A mapping of the scene file; it is immutable and has only the declared fields."""
 
@@ -97,11 +101,13 @@ class ScenePart(BaseModel):
         try:
             part = validate(given)
         except ValidationError as failure:
-            # a list also counts as too short if its invalid items were left out
+            # a list also counts as too short if its invalid items were left out, and a default
+            # that follows from other fields as wrong if one of these is
             mistakes += [
                 cls._explained(error)
                 for error in failure.errors(include_url=False)
-                if error["type"] != "too_short" or len(error["input"]) < error["ctx"]["min_length"]
+                if error["type"] != "default_factory_not_called"
+                and (error["type"] != "too_short" or _is_short(error))
             ]
         if mistakes:
             raise ValidationError.from_exception_data(cls.__name__, mistakes)
@@ -162,8 +168,6 @@ def mistakes_of(
     """
     found = []
     for error in failure.errors(include_url=False):
-        if error["type"] == "default_factory_not_called":
-            continue  # a default that follows from a field with a mistake
         path: list[str | int] = []
         here = read
         for key in (*inside, *error["loc"]):
