@@ -50,6 +50,7 @@ from iapb.scene.parts import (
     Number,
     Path,
     Positive,
+    SceneName,
     ScenePart,
     Text,
     Truth,
@@ -317,7 +318,7 @@ class Scene(ScenePart):
     """A scene to simulate: bodies, walls, contact parameters, and the hand that moves the tool (SI
     units)."""
 
-    name: Name = Field(description="the scene's name; runs are filed under it")
+    name: SceneName = Field(description="the scene's name; runs are filed under it")
     title: Text = Field("", description="one line for reports")
     source: Text = Field("", description="where the scene comes from")
     rate: Annotated[Positive, Field(le=MAX_RATE)] = Field(

@@ -49,6 +49,7 @@ Vector2 = tuple[Number, Number]
 Vector3 = tuple[Number, Number, Number]
 Truth = Annotated[bool, Field(strict=True)]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_-]{0,63}$", strict=True)]
+SceneName = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_.-]{0,63}$", strict=True)]
 Text = Annotated[str, Field(max_length=2000, strict=True)]
 
 Path = tuple[str | int, ...]  # of a value, such as ("bodies", 0, "mass")

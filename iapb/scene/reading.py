@@ -19,6 +19,12 @@ from iapb.scene.parts import ScenePart, mistakes_of, written
 from iapb.scene.robots import told, with_robots
 
 Part = TypeVar("Part", bound=ScenePart)
+_YAML = "a scene file in YAML (docs/scenes.md)"
+# endings of models that other programs read
+MODELS = {
+    ".xml": f"{_YAML}; models of MuJoCo are not read: give bodies and walls, or a robot as URDF",
+    ".urdf": f"{_YAML}, which takes this robot by: robots: [{{name: robot, urdf: FILE}}]",
+}
 
 
 def scene_folder() -> Path:
@@ -63,6 +69,8 @@ def find_scene(name: str | Path, folder: str = "") -> Path:
     except TypeError:
         raise ArgumentError("scene", name, "a path, or the name of a scene") from None
     if isfile(path):  # a path that is too long is no file; Path.is_file raises OSError
+        if path.suffix.lower() in MODELS:
+            raise ArgumentError("scene", str(name), MODELS[path.suffix.lower()])
         return path
     ours = scene_folder() / folder / f"{path.stem}.yaml"
     if str(name) in (path.stem, path.name) and isfile(ours):

@@ -13,13 +13,13 @@ import typer
 
 from iapb.errors import ArgumentError
 from iapb.lazy import needed
-from iapb.names import one_of
+from iapb.names import nearest
 from reports.commands.report import difference_lines
 from reports.difference import DIFFERS, ONLY_OLD, TOLERANCE, compare_reports, unlike
 from reports.evidence.gather import failed_cases, gather
 from reports.evidence.runs import FIGURE_RUNS, TILTED, figure_run, shipped_scene, tilted_runs
 from reports.figures import RECIPES
-from reports.figures.figure import draw, standalone
+from reports.figures.figure import TEXTS, draw, standalone
 from reports.numbers_file import read_numbers
 from reports.pages.builder import build_report, draw_all, figure_inputs
 from reports.pages.first import count_claims
@@ -187,7 +187,10 @@ def _write_figure(key: str, out: Path, depth: str) -> Answer:
     needed inputs."""
     recipes = {recipe.key: recipe for recipe in RECIPES}
     if key not in recipes:
-        raise ArgumentError("--figure", key, one_of(key, recipes))
+        listed = (f"{name} ({TEXTS[name]['title']})" for name in recipes)
+        near = nearest(key, recipes)
+        meant = f"; did you mean {near}?" if near else ""
+        raise ArgumentError("--figure", key, f"one of {', '.join(listed)}{meant}")
     with stage_progress() as progress:
         inputs, failed = _inputs(recipes[key].needs, out, depth, progress)
     drawn = draw(recipes[key], inputs)

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import copy
 import math
+import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from iapb.errors import ArgumentError
 from iapb.scene import Scene, find_scene, load_scene, scene_from_text
 
 PEG = load_scene(find_scene("peg_corner"))
@@ -178,3 +181,13 @@ def test_a_density_can_be_swept_and_what_it_gives_is_what_a_scene_holds() -> Non
     assert "density: null" in scene.with_values({}).source_text
     assert scene.with_values({"bodies.b.density": 20.0}).bodies[0].mass == pytest.approx(0.4)
     assert scene.with_values({"bodies.b.mass": 7.0}).bodies[0].mass == 7.0
+
+
+def test_a_scene_may_have_a_dot_in_its_name_and_other_models_are_named(tmp_path: Path) -> None:
+    made = scene_from_text((PLANE % "mass: 1, inertia: 1").replace("name: d", "name: arm.v2"))
+    assert made.name == "arm.v2"
+    for ending, said in ((".xml", "models of MuJoCo are not read"), (".urdf", "robots: [{name")):
+        model = tmp_path / f"model{ending}"
+        model.write_text("<mujoco/>")
+        with pytest.raises(ArgumentError, match=re.escape(said)):
+            find_scene(model)

@@ -60,7 +60,7 @@ NOT_A_PAIR_OF_GAINS = [[1], [1, 1, 1], [-1, 1], [1, "x"], 3, []]
 
 # path: values that are refused there; the mistake names the field
 IN_THE_PLANE: dict[str, list[Any]] = {
-    "name": NOT_A_NAME,
+    "name": [name for name in NOT_A_NAME if name != "a.b"],
     "rate": [*NOT_POSITIVE, 1.1e6],
     "duration": [*NOT_POSITIVE, 1e-4, 1e5],
     "integrator": ["leapfrog"],
