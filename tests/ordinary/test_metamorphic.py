@@ -138,8 +138,6 @@ def twice(values: Values) -> Values:
 
 def in_two(values: Values) -> Values:
     """The floor as two blocks that join below the first body."""
-    if FLOOR not in values.get("walls", []):
-        pytest.skip("it has no floor in the plane")
     seam = values["bodies"][0]["position"][0] + 0.013
     blocks = [
         {"name": f"block{k}", "kind": "box", "size": [100, 1], "center": [seam + x, -0.5]}
@@ -202,11 +200,22 @@ def plain() -> dict[str, dict[str, np.ndarray]]:
     return {}
 
 
+def means_something(name: str, change: str) -> bool:
+    """Whether a change can be made: turns and mirrors are of the plane, blocks replace its floor,
+    and numbers of a scene are at most 1e9."""
+    values, (how, place, _) = CASES[name].scene, CHANGES[change]
+    if values.get("dimensions") == 3:
+        return how is not in_two and place[2] is PLANE
+    whole = how is not in_two or FLOOR in values.get("walls", [])
+    return whole and (name, change) != ("heavy_box_rests", "in millimetres")
+
+
 # every pair of a scene and a change; one of six by default
 PAIRS = [
     pytest.param(name, change, marks=[] if (i + k) % 6 == 0 else pytest.mark.thorough)
     for i, name in enumerate(SCENES)
     for k, change in enumerate(CHANGES)
+    if means_something(name, change)
 ]
 
 
@@ -216,10 +225,6 @@ def test_a_change_that_means_nothing_changes_nothing(
 ) -> None:
     values = CASES[name].scene
     how, place, most = CHANGES[change]
-    if values.get("dimensions") == 3 and place[2] is not PLANE:
-        pytest.skip("turns and mirrors are in the plane")
-    if name == "heavy_box_rests" and place[0] != 1.0:
-        pytest.skip("numbers of a scene are at most 1e9")
     if name not in plain:
         plain[name] = ends(values)
     found, size = ends(placed(how(values), *place)), size_of(values)

@@ -279,14 +279,15 @@ def unclamped_friction(case: SceneCase) -> Run | None:
     )
 
 
-def overdriven_friction(case: SceneCase) -> Run | None:
-    """Simulates (6) instead of Coulomb's law; for its threshold velocity the step is too long, so
-    it drives bodies."""
-    contact = case.values["contact"]
-    if not contact.get("friction") or contact["forces"] == "paper":
+def driving_friction(case: SceneCase) -> Run | None:
+    """Records friction along the slip, which drives bodies, instead of against it."""
+    if not case.values["contact"].get("friction") or case.values["contact"]["forces"] == "paper":
         return None
-    run = _simulated_as(case, forces="paper", friction_velocity=1e-6)
-    return run if np.any(np.diff(run.energy["friction_work"]) > 0.0) else None
+    run = case.simulate()
+    work = np.diff(run.energy["friction_work"], prepend=0.0)
+    way = np.linalg.norm(np.diff(run.q, axis=0), axis=1)
+    slides = work.min() < -0.01 * np.max(np.linalg.norm(run.friction_force, axis=1) * way)
+    return replace(run, friction_force=-run.friction_force) if slides else None
 
 
 def device_beyond_its_limits(case: SceneCase) -> Run | None:
@@ -312,7 +313,7 @@ PLANTED_TRAJECTORY_FAULTS: dict[str, Callable[[SceneCase], Run | None]] = {
     "ledger": missing_half,
     "penalty": unclamped_penalty,
     "friction": unclamped_friction,
-    "friction_work": overdriven_friction,
+    "friction_work": driving_friction,
     "device_limits": device_beyond_its_limits,
 }
 
