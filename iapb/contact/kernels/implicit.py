@@ -4,20 +4,21 @@ makes energy.
 v* is the velocity after impulses and applied forces. Over the contacts of a group, with γ = J v and
 gap φ <= 0,
 
-    v⁺ = argmin ½ (v − v*)ᵀ M (v − v*) + Σ Δt f(γ)²/2k + Σ c h(|w|) + Σ Δt F h(|v_i|),   f = max(0, −K φ − k γ),   k =
-    K Δt + B,
+    v⁺ = argmin ½ (v − v*)ᵀ M (v − v*) + Σ Δt f(γ)²/2k + Σ c h(|w|) + Σ Δt F h(|v_i|),
+    f = max(0, −K φ − k γ),   k = K Δt + B,
 
-w the tangential velocities, c = μ Δt f the limit of friction, and h(|w|) = |w|, rounded below the
-speed STICKING so that it has a derivative: a contact that sticks creeps more slowly than that. F is
-the dry friction of a joint [N, N m], also of trees without contact. The
-function is strictly convex: one answer, also where contacts are redundant. M contains Δt D of
-damped joints. Newton's method with a line search solves it, from the velocity before the step's
-forces, which at rest is the answer. The limits of friction follow from the forces, so both are
-solved in turns; any limit c >= 0 dissipates. A gap that bends over the step (a ball in a drum, a
-slider on a turning arm) closes by ½ Δt² of an acceleration more than by Δt γ. What it closed more
-in the step before is added to γ in f; without this the contact would sink. In the same way w gets what
-the points of a contact that sticks have moved apart on their arcs, and since they stick: they stay
-together to third order in the step.
+w the tangential velocities, c = μ Δt f the limit of friction, F the dry friction of a joint
+[N, N m], also of trees without contact. h(|w|) = |w|, rounded below the speed STICKING so that it
+has a derivative: a contact that sticks creeps more slowly than that. The function is strictly
+convex: one answer, also where contacts are redundant. M contains Δt D of damped joints. Newton's
+method with a line search solves it, from the velocity before the step's forces, which at rest is
+the answer. The limits of friction follow from the forces, so both are solved in turns; any limit
+c >= 0 dissipates.
+
+A gap that bends over the step (a ball in a drum, a slider on a turning arm) closes by ½ Δt² of an
+acceleration more than by Δt γ. What it closed more in the step before is added to γ in f; without
+this the contact would sink. In the same way w gets what the touching points have moved apart on
+their arcs in the step before and, where they stick, since they stick.
 
 Where a gap is linear over the step, KE⁺ + Φ⁺ <= KE* + Φ with Φ = Σ ½ K min(φ, 0)², for every K, B
 >= 0 and Δt > 0 (`verification.proofs`). A solution that is not accurate enough to show this in

@@ -1,7 +1,9 @@
-"""Seams: contacts that a rigid body would not have, since only its sag reaches them.
+"""Seams: contacts that a rigid body would not have, since only its overlap with a support reaches
+them.
 
-A body that slides from one flush wall to the next overlaps the second one by its sag. The narrow
-phase then finds the side or the corner of this wall, and an impact there would stop the body.
+A body that slides from one flush wall to the next overlaps the second one as it does the first: by
+its sag, or by the step in which it landed. The narrow phase then finds the side or the corner of
+this wall, and an impact there would stop the body.
 """
 
 from __future__ import annotations
@@ -46,8 +48,8 @@ def leave_out_seams(world, state, count):
 
 @kernel
 def explained(world, state, i, count):
-    """Whether the pair of contact i does not overlap once one of its bodies is lifted out of a
-    resting contact."""
+    """Whether the pair of contact i does not overlap once one of its bodies is lifted out of
+    another contact of the same two bodies."""
     contacts, n = state.contacts, load(state.contacts.normal, i)
     for j in range(count):
         normal, sag = load(contacts.normal, j), 0.0

@@ -72,8 +72,10 @@ LARGEST_SPEED = 1e100
 OK, NOT_POSITIVE_DEFINITE, TOO_MANY_CONTACTS, NOT_FINITE = range(4)
 STATUS_TEXT = {
     NOT_POSITIVE_DEFINITE: "the mass matrix is not positive definite in this configuration",
-    TOO_MANY_CONTACTS: "more contacts at once than the scene's shapes can give: a fault of the engine",
-    NOT_FINITE: "the motion left the range of numbers: the step is too long for this stiffness and mass",
+    TOO_MANY_CONTACTS: "more contacts at once than the scene's shapes can give: a fault of the "
+    "engine",
+    NOT_FINITE: "the motion left the range of numbers: the step is too long for this stiffness "
+    "and mass",
 }
 
 
@@ -201,8 +203,8 @@ def move(world, state, applied):
 
 @kernel
 def implicit_forces(world, state, touches):
-    """Apply joint damping, joint friction and contact, from the state at the start of the step. Return False if M
-    is not definite."""
+    """Apply joint damping, joint friction and contact, from the state at the start of the step.
+    Return False if M is not definite."""
     damped = world.switches.joint_damping
     if damped and not damp_joints(world, state):
         return False

@@ -151,9 +151,12 @@ def test_a_wrong_limit_or_damping_is_refused_by_name(load: Load, inside: str, na
 
 def test_the_limits_of_a_continuous_or_fixed_joint_are_remarked_and_ignored(load: Load) -> None:
     scene = load(
-        PALM, FINGER, link("cap"), joint("turn", "finger", "continuous", RANGE),
+        PALM,
+        FINGER,
+        link("cap"),
+        joint("turn", "finger", "continuous", RANGE),
         joint("weld", "cap", "fixed", RANGE + '<dynamics damping="1"/>'),
-    )  # fmt: skip
+    )
     assert [body.joint_limits for body in scene.bodies] == [None] * 3
     (said,) = scene.remarks
     for what in ("of continuous joints (1)", "<limit> of fixed joints (1)", "<dynamics> of fixed"):
@@ -245,15 +248,22 @@ def test_friction_of_a_joint_holds_a_light_finger(load: Load) -> None:
 def test_one_remark_counts_what_has_no_effect(load: Load) -> None:
     shapes = "<visual><geometry><box/></geometry></visual><collision/><collision/>"
     scene = load(
-        PALM, link("finger", inside=shapes),
+        PALM,
+        link("finger", inside=shapes),
         SLIDE.replace('<axis xyz="0 0 1"/>', '<axis xyz="0 0 1" rpy="0 0 0"/>'),
         '<transmission name="t"/><gazebo/><gazebo reference="palm"/>',
-    )  # fmt: skip
+    )
     (said,) = scene.remarks
     for what in (
-        "effort of <limit> (1)", "velocity of <limit> (1)", "<visual> (1)", "<collision> (2)",
-        "rpy of <axis> (1)", "<transmission> (1)", "<gazebo> (2)", "the scene gives shapes",
-    ):  # fmt: skip
+        "effort of <limit> (1)",
+        "velocity of <limit> (1)",
+        "<visual> (1)",
+        "<collision> (2)",
+        "rpy of <axis> (1)",
+        "<transmission> (1)",
+        "<gazebo> (2)",
+        "the scene gives shapes",
+    ):
         assert said.count(what) == 1
     assert simulate(scene, steps=1).remarks[0] == said
     assert scene.with_values({"rate": 500}).remarks == scene.remarks
