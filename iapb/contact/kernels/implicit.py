@@ -176,16 +176,23 @@ def rest_group(world, state, group, s):
     work.energy[0] = -1.0  # not known yet
     work.stiffness[0], k = stiffness_of_group(world, work, group)
     count = gather_contacts(world, state, group, s)
+    if not solve_in_turns(world, state, size, count, s, k):
+        work.bend[: count * s] = 0.0  # it is not in the energy that `guard` compares
+        if not solve_in_turns(world, state, size, count, s, k):
+            guard(world, state, size, count, s)
+    give_back(world, state, size, count, s)
+
+
+@kernel
+def solve_in_turns(world, state, size, count, s, k):
+    """Solve for the velocity and for the limits of friction in turns; return whether the last
+    velocity is solved."""
     solved = solve(world, state, size, count, s, k)
     for turn in range(TURNS if s > 1 else 0):
         if not follow_limits(world, state, count, s, 1.0 if turn < FREE_TURNS else 0.5):
             break
         solved = solve(world, state, size, count, s, k)
-    if not solved:  # what bends is not in the energy that `guard` compares
-        work.bend[: count * s] = 0.0
-        if not solve(world, state, size, count, s, k):
-            guard(world, state, size, count, s)
-    give_back(world, state, size, count, s)
+    return solved
 
 
 @kernel
