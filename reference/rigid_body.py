@@ -187,14 +187,6 @@ class PinocchioMechanism:
                 return True
         return False
 
-    def calls(self) -> tuple[Callable[[Floats], Floats], Callable[[Floats, Floats], Floats]]:
-        """Return Pinocchio's functions q -> M and (q, v) -> B + G, bound to the model, for
-        timing."""
-        return (
-            partial(self.pin.crba, self.model, self.data),
-            partial(self.pin.nonLinearEffects, self.model, self.data),
-        )
-
     def index(self, body: str) -> int:
         """Return the place of a body in the arrays of `bodies`."""
         if body not in self._places:
@@ -245,6 +237,20 @@ def model_from_urdf(path: str | Path, floating_base: bool = False) -> PinocchioM
             follows = joint.extract()
             followers.append((i, leaders[joint.idx_q], follows.scaling, follows.offset))
     return PinocchioMechanism(model, followers)
+
+
+def calls_from_urdf(
+    path: str | Path,
+) -> tuple[Callable[[Floats], Floats], Callable[[Floats, Floats], Floats]]:
+    """Return Pinocchio's functions q -> M and (q, v) -> B + G, bound to its own model, for
+    timing."""
+    pinocchio = _pinocchio()
+    model = pinocchio.buildModelFromUrdf(str(path), mimic=True)
+    data = model.createData()
+    return (
+        partial(pinocchio.crba, model, data),
+        partial(pinocchio.nonLinearEffects, model, data),
+    )
 
 
 def model_of(mechanism: Mechanism) -> PinocchioMechanism:

@@ -14,7 +14,7 @@ import numpy as np
 
 from iapb.mechanics.mechanism import Mechanism
 from reference.random_mechanisms import random_state
-from reference.rigid_body import model_from_urdf
+from reference.rigid_body import calls_from_urdf
 from verification.check import Check, Study
 from verification.clock import limited, seconds, take_turns
 from verification.finding import NOT_COMPUTED, Part
@@ -34,7 +34,7 @@ def time_robot(study: Study, name: str) -> Iterator[Row]:
     mechanism, rng = Mechanism.from_urdf(FILES[name]), np.random.default_rng(SEED)
     states = [random_state(rng, mechanism) for _ in range(STATES)]
     qs, vs = (np.array(rows) for rows in zip(*states, strict=True))
-    their_mass, their_bias = model_from_urdf(FILES[name]).calls()
+    their_mass, their_bias = calls_from_urdf(FILES[name])
     places = [(q,) for q, _ in states]
     one = (
         ("mass matrix", mechanism.mass_matrix, their_mass, places),
