@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 
 import sympy
 
+from iapb.errors import ArgumentError
 from verification.proofs.cases import Case, Comparison
 from verification.proofs.layout import Block
 
@@ -78,15 +79,38 @@ class Text:
         left, sign, right = re.split(r"([=≠≤≥⪯⪰≻])", formula)
         low, high = (right, left) if sign in "=≠≥⪰≻" else (left, right)
         value, sign = self.read(high) - self.read(low), {"≤": "≥", "⪯": "⪰"}.get(sign, sign)
-        return Relation(value, sign if sign != "≥" or self.is_number(value) else "entries")
+        shape = self.shape(value)
+        if not shape or (sign in "⪰≻" and shape[0] != shape[1]):
+            raise ArgumentError("formula", formula, "fitting sizes for SymPy, square for ⪰ and ≻")
+        return Relation(value, sign if sign != "≥" or shape == ("1", "1") else "entries")
 
     def is_number(self, value: Any) -> bool:
         """Whether each product of the sum has one row and one column."""
-        return all(
-            self._size(word[0], 0) == "1" == self._size(word[-1], 1)
-            for _, word in _words(value)
-            if word
-        )
+        return self.shape(value) == ("1", "1")
+
+    def shape(self, value: Any) -> tuple[str, str] | None:
+        """Return the names of the numbers of rows and columns; None if the products and the sum do
+        not fit. A scalar has the shape of what it stands beside."""
+        shapes = set()
+        words = [word for _, word in _words(value)]
+        for word in filter(None, words):
+            sizes = [self._size(letter, side) for letter in word for side in (0, 1)]
+            if sizes[1:-1:2] != sizes[2::2]:
+                return None
+            shapes.add((sizes[0], sizes[-1]))
+        rows, columns = shape = next(iter(shapes), ("1", "1"))
+        return shape if len(shapes) < 2 and (rows == columns or all(words)) else None
+
+    def refuse_assumption(self, formula: str, taken: set[Any]) -> None:
+        """Raise ArgumentError unless the formula defines a letter that is not in `taken`; add its
+        letters."""
+        left, sign, right = re.split(r"([=≠≤≥⪯⪰≻])", formula)
+        letter, value = self.read(left), self.read(right)
+        used = taken | value.free_symbols
+        scalar = letter.is_commutative and not self.is_number(value)
+        if sign != "=" or not letter.is_Symbol or letter in used or scalar:
+            raise ArgumentError("where", formula, "the definition of a letter for SymPy")
+        taken |= used | {letter}
 
     def _size(self, letter: Any, side: int) -> str:
         """Return the name of the number of rows (0) or columns (1)."""
@@ -112,6 +136,10 @@ def refusal(
     dominating has none.
     """
     text = Text(block)
+    defined: set[Any] = set()
+    for entry in block.all("where"):
+        for each in entry.formula.split(";"):
+            text.refuse_assumption(each, defined)
     known = [
         text.relation(each)
         for entry in block.all("given", "where")
@@ -242,7 +270,7 @@ def _follows(
     ):
         return text.same(x.transpose() * core * x, value if source.relation == "=" else -value)
     if rule == "dividing" and claim.relation == source.relation == "=" and kind == "≠":
-        return text.same(core * x, value)
+        return text.is_number(core) and text.same(core * x, value)
     return (
         rule == "dominating"
         and claim.relation == source.relation == kind == "≥"

@@ -57,6 +57,15 @@ def read_case(text: str, names: Iterable[str], base: Mapping[str, fmpq_mat] | No
     }
 
 
+def refuse_sizes(case: Case, shapes: Mapping[str, tuple[str, ...]]) -> None:
+    """Raise ArgumentError if the values give a size two values, or the size 1 another one."""
+    found = {("1", 1)}
+    for name, value in case.items():
+        found.update(zip(shapes[name] or ("1", "1"), (value.nrows(), value.ncols()), strict=True))
+    if len(dict(found)) < len(found):
+        raise ArgumentError("case", sorted(found), "one value for each size")
+
+
 def matrix_of(rows: Sequence[Sequence[Fraction | int | str]]) -> fmpq_mat:
     """Return the rational matrix of python-flint."""
     return fmpq_mat([[fmpq(*Fraction(entry).as_integer_ratio()) for entry in row] for row in rows])

@@ -97,6 +97,9 @@ class Block:
         for group in (group for entry in self.all("letters") for group in entry.formula.split(",")):
             names, _, sizes = group.partition(":")
             shape = tuple(sizes.split())
+            sized = len(shape) < 3 and all(size.isidentifier() or size == "1" for size in shape)
+            if not sized or "I" in names.split():
+                raise ArgumentError("letters", group, "names but I: one or two sizes (names, or 1)")
             found |= dict.fromkeys(names.split(), (*shape, "1") if len(shape) == 1 else shape)
         return found
 
@@ -106,7 +109,11 @@ class Block:
         both = (
             each.partition("=") for entry in self.all("let") for each in entry.formula.split(";")
         )
-        return [(name.strip(), formula.strip()) for name, _, formula in both]
+        found = [(name.strip(), formula.strip()) for name, _, formula in both]
+        names = [*self.shapes, "I", *(name for name, _ in found)]
+        if len(set(names)) < len(names):
+            raise ArgumentError("let", names, "names that are not taken")
+        return found
 
 
 def all_names() -> tuple[str, ...]:

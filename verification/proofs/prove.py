@@ -29,7 +29,7 @@ def checked(block: Block) -> ProofRecord:
     started = time.perf_counter()
     statement = Statement(block)
     known = Known([*statement.given, *statement.definitions])
-    steps = [_checked(task, known) for task in statement.tasks]
+    steps = checked_steps(statement, known)
     comparisons, false_ones = (
         numbers.BY_STATEMENT[block.name]() if block.all("numbers") else ((), ())
     )
@@ -61,9 +61,7 @@ def checked(block: Block) -> ProofRecord:
         if fact.name not in known.used
     ]
     problems += [] if twins else ["no wrong twin"]
-    if statement.given and not all_hold(
-        [*statement.given, *statement.conclusions], statement.case("")
-    ):
+    if statement.given and not _witnessed(statement):
         problems.append("no exact case satisfies the hypotheses and the conclusions")
     (title,), (source,), (says,) = (block.prose(key) for key in ("title", "source", "says"))
     return ProofRecord(
@@ -86,6 +84,11 @@ def checked(block: Block) -> ProofRecord:
     )
 
 
+def checked_steps(statement: Statement, known: Known) -> list[StepRecord]:
+    """Check the steps in their order, and add what each one proves to `known`."""
+    return [_checked(task, known) for task in statement.tasks]
+
+
 def _checked(task: Task, known: Known) -> StepRecord:
     claim, because = fact_line(task.claim), task.entry.note
     try:
@@ -99,6 +102,16 @@ def _checked(task: Task, known: Known) -> StepRecord:
     lines = step_lines(step, known)
     known.facts.append(step.claim)
     return StepRecord(claim, because, lines)
+
+
+def _witnessed(statement: Statement) -> bool:
+    """Return whether the hypotheses and the conclusions hold in the case without a name, as the
+    kernel and SymPy read them."""
+    case, block = statement.case(""), statement.block
+    formulas = [each for entry in block.all("given", "show") for each in entry.formula.split(";")]
+    return all_hold([*statement.given, *statement.conclusions], case) and all(
+        by_sympy.holds(block, formula, case) for formula in formulas
+    )
 
 
 def _needed(entry: Entry, dropped: list[Fact], statement: Statement) -> Refutation:

@@ -247,24 +247,27 @@ def step_lines(step: Step, known: Known) -> tuple[Line, ...]:
     or zero."""
     if step.sources:
         return (Line("from " + " and ".join(f"'{fact.name}'" for fact in step.sources)),)
-    lines = []
+    reasoned = []
     for factors in step.terms:
         names = " and ".join(f"'{fact.name}'" for fact in reasons(factors, known))
-        lines.append(
-            Line(
-                f"non-negative by {names}" if names else "a square",
-                " · ".join(map(_bracketed, factors)),
-            )
-        )
+        reasoned.append(f"non-negative by {names}" if names else "a square")
+    reasoned += [f"by '{fact.name}'" for _, fact, _ in step.cofactors]
+    return tuple(map(Line, reasoned, products_of(step)))
+
+
+def products_of(step: Step) -> list[str]:
+    """Return the products of a certificate as text: the terms, then the cofactors."""
+    found = [[_bracketed(factor) for factor in factors] for factors in step.terms]
     for left, fact, right in step.cofactors:
         one, other = str(fact).split(" = ")
-        parts = [
-            *[_bracketed(left)] * (left != ONE),
-            f"[{one} − {_bracketed(other)}]",
-            *[_bracketed(right)] * (right != ONE),
-        ]
-        lines.append(Line(f"by '{fact.name}'", " · ".join(parts)))
-    return tuple(lines)
+        found.append(
+            [
+                *[_bracketed(left)] * (left != ONE),
+                f"[{one} − {_bracketed(other)}]",
+                *[_bracketed(right)] * (right != ONE),
+            ]
+        )
+    return [" · ".join(factors) for factors in found]
 
 
 def _bracketed(value: Expression | str) -> str:

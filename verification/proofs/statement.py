@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from iapb.errors import ArgumentError
-from verification.proofs.cases import Case, completed, read_case
+from verification.proofs.cases import Case, completed, read_case, refuse_sizes
 from verification.proofs.layout import Block, Entry
 from verification.proofs.steps import Cofactor, Factors, Refused
-from verification.proofs.words import Expression, Fact, Product, Reader, letter, names_in, product
+from verification.proofs.words import (
+    ANY,
+    Expression,
+    Fact,
+    Product,
+    Reader,
+    letter,
+    names_in,
+    product,
+)
 
 _INFERENCES = {"cancelling": "cancel", "dividing": "divide", "dominating": "dominate"}
 
@@ -43,13 +53,8 @@ class Statement:
         self.definitions = [fact for entry in block.all("where") for fact in self._facts(entry)]
         taken: set[str] = set()
         for definition in self.definitions:
-            new = names_in(definition.lhs)
-            taken |= names_in(definition.rhs)
-            if len(new) != 1 or definition.lhs != self.names[min(new)] or new & taken:
-                raise ArgumentError(
-                    "where", definition.name, "one letter that its right side and earlier ones lack"
-                )
-            taken |= new
+            _refuse_assumption(definition, self.names, taken)
+            taken |= names_in(definition.lhs) | names_in(definition.rhs)
         self.tasks: list[Task] = []
         for entry in block.all("lemma", "show", "sum", "by"):
             self._read_step(entry)
@@ -61,9 +66,11 @@ class Statement:
     def case(self, text: str) -> Case:
         """Return the values of a case, with those of the definitions."""
         name, _, values = text.rpartition(":")
-        return completed(
+        case = completed(
             read_case(values, self.block.shapes, self.cases.get(name, {})), self.definitions
         )
+        refuse_sizes(case, self.block.shapes)
+        return case
 
     def _facts(self, entry: Entry) -> list[Fact]:
         return [self.reader.fact(each, entry.words) for each in entry.formula.split(";")]
@@ -80,6 +87,23 @@ class Statement:
             self.tasks[-1].terms += [
                 tuple(x for x in term if isinstance(x, Expression)) for term in terms
             ]
+
+
+def _refuse_assumption(definition: Fact, names: Mapping[str, Expression], taken: set[str]) -> None:
+    """Raise ArgumentError if the definition could be false for some values of the letters.
+
+    `taken` holds the letters of the definitions before.
+    """
+    left, right = definition.lhs, definition.rhs
+    new = names_in(left)
+    alone = len(new) == 1 and left == names[min(new)]
+    fits = definition.relation == "=" and (left.rows != ANY or right.is_number)
+    if not alone or not fits or new & (taken | names_in(right)):
+        raise ArgumentError(
+            "where",
+            definition.name,
+            "one letter that its right side and earlier ones lack = a value of its size",
+        )
 
 
 def _cofactor(factors: Product) -> Cofactor:

@@ -5,8 +5,10 @@ sum        claim.lhs − claim.rhs = sum of non-negative terms
            + sum of  left * (equation.lhs − equation.rhs) * right;
            an equation has no non-negative terms
 cancel     N = 0, since N' X N = 0 (or ≤ 0) with X positive definite (or without an X)
-divide     N = 0, since s N = 0 and the scalar s is not 0
+divide     N = 0, since s N = 0 and the number s is not 0
 dominate   x ≥ 0, since q x − x² ≥ 0 and q ≥ 0 (scalars)
+
+docs/proofs.md lists what each step needs, with a statement that lacks it.
 """
 
 from __future__ import annotations
@@ -175,7 +177,7 @@ def _follows(method: str, claim: Fact, source: Fact, other: Fact | None) -> bool
             x.T * core * x, value if source.relation == "=" else -value
         )
     if method == "divide" and claim.relation == source.relation == "=":
-        return kind == "≠" and _same(core * x, value)
+        return kind == "≠" and core.is_number and _same(core * x, value)
     return (
         method == "dominate"
         and claim.relation == source.relation == kind == "≥"

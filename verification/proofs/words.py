@@ -174,7 +174,7 @@ class Fact:
     """A relation for all values of the letters that satisfy the other facts; all but an equation
     compare with 0.
 
-    = equal, ≠ a scalar that is not 0, ≥ a number or every entry of a matrix is not negative, ⪰ x'
+    = equal, ≠ not 0 (of a matrix: some entry is not 0), ≥ a number or every entry of a matrix is not negative, ⪰ x'
     value x >= 0 for every x, ≻ the same with > for every x other than 0.
     """
 
@@ -271,11 +271,15 @@ class Reader:
             value = number(Fraction(token))
         else:
             raise ArgumentError("formula", token, f"one of {' '.join(self.names)}")
-        times = 1
-        while tokens[0] and tokens[0] in "ᵀ" + _POWERS:
-            mark = tokens.popleft()
-            value, times = (value.T, times) if mark == "ᵀ" else (value, times * _POWERS.index(mark))
-        return [value] * times
+        while tokens[0] == "ᵀ":
+            tokens.popleft()
+            value = value.T
+        power = ""
+        while tokens[0] and tokens[0] in _POWERS:
+            power += str(_POWERS.index(tokens.popleft()))
+        if power.startswith("0"):
+            raise ArgumentError("formula", f"the power {power}", "a power of at least 1")
+        return [value] * int(power or 1)
 
 
 def _total(products: Iterable[Product]) -> Expression:

@@ -177,9 +177,10 @@ def test_coq_accepts_the_development_and_assumes_the_reals_alone() -> None:
 @pytest.mark.parametrize(
     ("now", "then"),
     [
-        ("(one - e * e) * form", "(one - e) * form"),
-        ("opp (e * J * v)", "e * J * v"),
-        ("W * G * W = W", "W * G * W = G"),
+        ("(1 - e * e) / 2 * dot (J *v v) (G", "(1 - e * e) * dot (J *v v) (G"),
+        ("J *v w = scale (- e)", "J *v w = scale e"),
+        ("energy M w <= energy M v", "energy M v <= energy M w"),
+        ("-1 <= e <= 1", "-1 <= e <= 2"),
     ],
 )
 def test_coq_refuses_a_corrupted_statement(now: str, then: str, tmp_path: Path) -> None:

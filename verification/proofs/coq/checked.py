@@ -3,7 +3,8 @@ checked.json.
 
 `Checker.v` verifies an exact judge of impacts and extracts it to OCaml; `checker.ml` reads the file
 that `iapb certify --export` writes. `Passive.v`, `Accepted.v` and `Wide.v` prove with Flocq what
-the resolver's last step accepts. `Theorems.v` states Theorems 1 and 2 and (33) by hand.
+the resolver's last step accepts. `Theorems.v` states Theorems 1 and 2 and (33) by hand, for real
+matrices of every size; it says of both theorems that no energy is added.
 
 checked.json holds the version of Coq, the hash of each source, and the axioms of each theorem. If
 the file is missing, or was made from other sources, Coq has not run. The Makefile calls this module
