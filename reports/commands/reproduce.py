@@ -6,6 +6,7 @@ import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -19,7 +20,7 @@ from reports.difference import DIFFERS, ONLY_OLD, TOLERANCE, compare_reports, un
 from reports.evidence.gather import failed_cases, gather
 from reports.evidence.runs import FIGURE_RUNS, TILTED, figure_run, shipped_scene, tilted_runs
 from reports.figures import RECIPES
-from reports.figures.figure import TEXTS, draw, standalone
+from reports.figures.figure import TEXTS, Recipe, draw, standalone
 from reports.numbers_file import read_numbers
 from reports.pages.builder import build_report, draw_all, figure_inputs
 from reports.pages.first import count_claims
@@ -28,6 +29,7 @@ from reports.report import keep_answer, kept_answer, report_key, write_companion
 from reports.runner import Runner
 from reports.show import Answer, Json, counted, stage_progress
 from reports.store.io import write_whole
+from reports.uses import parsed
 from verification.finding import Failure
 
 SHOWN_FAILURES = 20  # of a stage, in the last lines
@@ -51,6 +53,14 @@ def reproduce(
         Path | None,
         typer.Option(help="Recompute everything and compare all numbers with this report."),
     ] = None,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            help="With --figure: change a value of the figure's scenes, as in iapb run: "
+            "contact.friction=0.3. Repeatable.",
+        ),
+    ] = None,
     json_: Json = False,
 ) -> Answer:
     """Regenerate the report; cached results are reused."""
@@ -62,7 +72,11 @@ def reproduce(
     depth, folder = "full" if full else "quick", out or Path("out")
     if check is not None:
         return check_report(check, out)
-    return make_report(folder, depth) if figure is None else _write_figure(figure, folder, depth)
+    if figure is not None:
+        return _write_figure(figure, folder, depth, set_ or [])
+    if set_:
+        raise ArgumentError("--set", " ".join(set_), "a figure whose scenes it changes: --figure")
+    return make_report(folder, depth)
 
 
 def make_report(out: Path, depth: str) -> Answer:
@@ -182,9 +196,12 @@ def check_report(report: Path, out: Path | None) -> Answer:
     )
 
 
-def _write_figure(key: str, out: Path, depth: str) -> Answer:
+def _write_figure(key: str, out: Path, depth: str, changes: list[str]) -> Answer:
     """Write each panel of a figure, and all panels with the legend in one file; compute only the
-    needed inputs."""
+    needed inputs.
+
+    `changes` are values of the figure's scenes, as KEY=VALUE; the title and the files then say so.
+    """
     recipes = {recipe.key: recipe for recipe in RECIPES}
     if key not in recipes:
         listed = (f"{name} ({TEXTS[name]['title']})" for name in recipes)
@@ -192,8 +209,18 @@ def _write_figure(key: str, out: Path, depth: str) -> Answer:
         meant = f"; did you mean {near}?" if near else ""
         raise ArgumentError("--figure", key, f"one of {', '.join(listed)}{meant}")
     with stage_progress() as progress:
-        inputs, failed = _inputs(recipes[key].needs, out, depth, progress)
-    drawn = draw(recipes[key], inputs)
+        inputs, failed = _inputs(recipes[key], out, depth, parsed(changes), progress)
+    undrawn: list[Failure] = []
+    drawn = draw(recipes[key], inputs, undrawn if changes else None)
+    for failure in undrawn:
+        raise ArgumentError(
+            "--set",
+            " ".join(changes),
+            f"values with which {key} can be drawn: {failure.error}: {failure.reason}",
+        )
+    if changes:
+        drawn = replace(drawn, title=f"{drawn.title}, with {', '.join(changes)}")
+        key = f"{key}-changed"
     if not drawn.panels:
         raise ArgumentError(
             "--figure", key, f"a figure whose inputs exist; missing: {', '.join(drawn.missing)}"
@@ -217,21 +244,30 @@ def _write_figure(key: str, out: Path, depth: str) -> Answer:
     )
 
 
+def _has_scenes_only(recipe: Recipe) -> bool:
+    """Whether the figure is drawn from runs and scenes only, so that it needs no other evidence."""
+    return all(name in (*FIGURE_RUNS, TILTED) or name.startswith("scene/") for name in recipe.needs)
+
+
 def _inputs(
-    needs: tuple[str, ...], out: Path, depth: str, progress: Any
+    recipe: Recipe, out: Path, depth: str, values: dict[str, Any], progress: Any
 ) -> tuple[Mapping[str, Any], tuple[FailedCases, ...]]:
     """Return the inputs of a figure and the failed cases. If runs and scenes do not suffice,
     compute all evidence."""
-    if not all(name in (*FIGURE_RUNS, TILTED) or name.startswith("scene/") for name in needs):
+    needs = recipe.needs
+    if not _has_scenes_only(recipe):
+        if values:
+            able = ", ".join(each.key for each in RECIPES if _has_scenes_only(each))
+            raise ArgumentError("--set", recipe.key, f"a figure that shows scenes: {able}")
         evidence = gather(out, depth, progress)
         return figure_inputs(evidence), evidence.failed
     runner, found = Runner(out / "runs"), dict[str, Any]()
     for done, name in enumerate(needs, 1):
         if name in FIGURE_RUNS:
-            found[name] = figure_run(runner, name)
+            found[name] = figure_run(runner, name, values)
         elif name == TILTED:
-            found[name] = tilted_runs(runner)
+            found[name] = tilted_runs(runner, values)
         else:
-            found[name] = shipped_scene(name.removeprefix("scene/")).resolved()
+            found[name] = shipped_scene(name.removeprefix("scene/"), values).resolved()
         progress("runs of the figure", done, len(needs))
     return found, ()

@@ -163,6 +163,9 @@ REFUSED = [  # status, command line, what the refusal says
     (1, "prove no_such_statement", "no_such_statement"),
     (1, "prove theorem1", "did you mean theorem_1?"),
     (1, "reproduce --figure fig7", "did you mean fig07?"),
+    (1, "reproduce --set contact.friction=0.2", "a figure whose scenes it changes"),
+    (1, "reproduce --figure fig04 --set contact.frictoin=0.2", "friction"),
+    (1, "reproduce --figure energy-gains --set contact.friction=0.2", "fig07"),
     (1, "report diff here there", "report = 'here'"),
     (1, "bench --budget 50", "budget = '50': expected a time with its unit, e.g. 50us"),
     (
@@ -230,6 +233,30 @@ JSON = {  # of each row in the documents: the status, and a command
     "prove": (0, "prove theorem_1"),
     "reproduce --figure": (0, "reproduce --figure fig02 --out figures"),
 }
+
+
+def test_a_figure_of_changed_scenes_says_so_and_leaves_the_papers_figure(answer, here):
+    turned = "bodies.peg.position=[0.03, -0.02, 0.5]"
+    figure = ("reproduce", "--figure", "fig04", "--out", "drawn")
+    assert answer(*figure)[0] == 0 == answer(*figure, "--set", turned)[0]
+    plain, changed = (
+        (here / "drawn" / f"{name}.svg").read_text(encoding="utf-8")
+        for name in ("fig04", "fig04-changed")
+    )
+    assert turned in changed and turned not in plain
+    drawings = [re.sub("<title>.*</title>", "", text) for text in (plain, changed)]
+    assert drawings[0] != drawings[1], "the peg is drawn where the value puts it"
+
+
+@pytest.mark.thorough
+def test_a_figure_of_changed_runs_is_drawn_from_them(answer, here):
+    _, made = answer("reproduce", "--figure", "fig13", "--set", "duration=0.05", "--out", "drawn")
+    runs = list((here / "drawn" / "runs").rglob("*.h5"))
+    assert len(runs) == 3 and all(
+        read_run(path).steps_done * read_run(path).dt == pytest.approx(0.05, abs=2e-3)
+        for path in runs
+    )
+    assert made["drawings"]
 
 
 def test_json_has_the_keys_that_the_documents_list_and_an_error_is_an_object_too(answer, here):
