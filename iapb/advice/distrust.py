@@ -45,6 +45,10 @@ OVERRUN = {
 }  # of a joint's range: largest distance beyond a limit at the end, by forces
 # of the thinner shape: a pair that moves by less in a step overlaps before one is through the other
 FAST = 0.5
+# of the way of a contact in one step, whose end gives the velocity: largest overlap of a landing
+LANDING = 1.05
+MANY = 64  # landings of one step, and of the step before, that are looked at
+ALONG = 0.9  # least cosine of the angle between the normals of one contact in two steps
 NEAR = 1e-3  # of an overlap: how far from its wall's surface its end may lie
 SLOW = 1e-6  # [m/s, rad/s] of a free body: slower motion may be rounding error
 WILD = 10.0  # factor on the farthest distance that start, speed and acceleration explain
@@ -353,19 +357,47 @@ def _sank(seen: _Seen) -> Iterator[str]:
             np.minimum(thinner[rows], wall.thin),
             np.minimum(most[rows], wall.thin),
         )
-    i = int(np.argmin(table.gap / most)) if len(table.gap) else -1
-    if i >= 0 and not -table.gap[i] <= most[i]:
+    share = -table.gap / most
+    share[_landed(seen, np.flatnonzero((share > 1.0) & (-table.gap < thinner)))] = 0.0
+    i = int(np.argmax(share)) if len(share) else -1
+    if i >= 0 and not share[i] <= 1.0:
         k = int(np.searchsorted(table.offsets, i, "right")) - 1
         a, b = (
             run.body_names[x] if x >= 0 else "a wall" for x in (table.body_a[i], table.body_b[i])
         )
         b += " (or the limit of its joint)" if seen.bodies[table.body_a[i]].joint_limits else ""
-        share = "all" if -table.gap[i] >= thinner[i] else "more than half"
+        part = "all" if -table.gap[i] >= thinner[i] else "more than half"
         yield (
             f"{a} and {b} overlap by {in_metres(-float(table.gap[i]))} at {run.time[k]:.4g} s, "
-            f"{share} of "
+            f"{part} of "
             f"{in_metres(float(thinner[i]))}"
         )
+
+
+def _landed(seen: _Seen, rows: Integers) -> Integers:
+    """Return the deep contacts that are landings, and their later ones while the overlap fades, up
+    to the first that is neither.
+
+    A landing is new, and its way in the step explains the overlap: the normal points to where the
+    body came from, so it leaves on that side. A spring (`forces: paper`) would throw it out.
+    """
+    if seen.scene.contact.forces != "implicit":
+        return rows[:0]
+    table, landed = seen.run.contacts, list[int]()
+    step = np.searchsorted(table.offsets, np.arange(len(table.gap)), "right")
+    pair = np.stack([step, table.body_a, table.body_b], axis=1)
+    new = table.is_new & (table.gap >= LANDING * table.normal_velocity * seen.run.dt)
+    for row in rows.tolist():
+        fading = (
+            (pair[before] + [1, 0, 0] == pair[row]).all()
+            and table.gap[before] <= table.gap[row]
+            and table.normal[before] @ table.normal[row] > ALONG
+            for before in landed[-MANY:]
+        )
+        if not (new[row] or any(fading)):
+            break
+        landed.append(row)
+    return np.array(landed, np.int64)
 
 
 def _passed(seen: _Seen) -> Iterator[str]:

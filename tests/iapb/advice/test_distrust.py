@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from iapb.advice.distrust import distrust_of
+from iapb.advice.distrust import UNACCOUNTED, distrust_of
 from iapb.run import Run
 from iapb.scene import Scene, SpatialScene
 from iapb.simulation import simulate
@@ -92,6 +92,76 @@ def test_each_reason_is_found_in_the_arrays_of_a_sound_run() -> None:
         (replace(run, q=lost), "not finite"),
     ):
         assert why in distrust_of(planted)[0]
+
+
+def landed() -> Run:
+    """A box whose record is that of a deep landing: it comes in one step, and the overlap fades."""
+    run = fallen(forces="implicit")
+    table = run.contacts
+    first = int(np.flatnonzero(np.diff(table.offsets))[0])
+    since = np.searchsorted(table.offsets, np.arange(len(table.gap)), "right") - 1 - first
+    gap = -0.6 * SIDE * 0.97**since
+    velocity = np.where(since == 0, gap / run.dt, table.normal_velocity)
+    return replace(run, contacts=replace(table, gap=gap, normal_velocity=velocity))
+
+
+def test_a_deep_landing_is_right_while_its_step_explains_it_and_it_fades() -> None:
+    run = landed()
+    table = run.contacts
+    assert distrust_of(run) == ()
+    turned, deeper = table.normal.copy(), table.gap.copy()
+    turned[4:] *= -1.0  # out on the other side
+    deeper[4:6] -= 0.03 * SIDE
+    for planted in (
+        {"is_new": np.zeros_like(table.is_new)},
+        {"normal_velocity": 0.9 * table.normal_velocity},  # the step explains a part of it
+        {"normal_velocity": -table.normal_velocity},  # it came from the other side
+        {"normal": turned},
+        {"gap": deeper},
+    ):
+        said = distrust_of(replace(run, contacts=replace(table, **planted)))
+        assert "more than half of 100 mm" in said[0], planted
+    (whole,) = distrust_of(replace(run, contacts=replace(table, gap=2.0 * table.gap)))
+    assert "all of 100 mm" in whole, "no landing is that deep"
+    springs = run.scene_resolved | {"contact": {"forces": "paper", "stiffness": 1e4}}
+    assert distrust_of(replace(run, scene_resolved=springs))
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("thick", [0.002, 0.01, 0.05])
+@pytest.mark.parametrize("rate", [250.0, 1000.0])
+@pytest.mark.parametrize("e", [0.0, 0.7])
+def test_a_stick_that_a_floor_stops_within_its_thickness_is_right(
+    thick: float, rate: float, e: float
+) -> None:
+    """Law: it leaves with e times its speed, to where a free flight from the floor ends but for the
+    way of two steps. Its tenth step ends 0.8 thicknesses inside the floor."""
+    way = 1.2 * thick
+    stick = body("stick", {"kind": "box", "size": [1.0, thick]}, [0, 0], [0, -way * rate])
+    stick |= {"inertia": 0.2 / 12.0, "position": [0, 0.5 * thick + 10.0 * way - 0.8 * thick, 0]}
+    floor = {"name": "floor", "kind": "half_plane", "point": [0, 0], "normal": [0, 1]}
+    run = run_of(stick, walls=[floor], steps=40, rate=rate, contact={"restitution": e})
+    due = 0.5 * thick + e * (30.0 * way + 0.8 * thick)
+    assert run.v[-1, 1] == pytest.approx(e * way * rate, abs=UNACCOUNTED * way * rate)
+    assert run.q[-1, 1] == pytest.approx(due, abs=2.0 * way)
+    assert run.distrust == ()
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("k", [0, 1, 2])
+@pytest.mark.parametrize("rate", [1000.0, 4000.0])
+@pytest.mark.parametrize("radius", [0.03, 0.1])
+def test_two_masses_and_a_wall_count_the_digits_of_pi(k: int, rate: float, radius: float) -> None:
+    """Law (Galperin 2003): masses 1 and 100^k collide as often as the first k + 1 digits of pi
+    say. The small one goes at most 0.6 of its width in a step."""
+    shape, speed = {"kind": "circle", "radius": radius}, 1.2 * radius * rate / 10.0**k
+    small = body("small", shape, [-0.5, 0], [], mass=1.0)
+    large = body("large", shape, [-0.8, 0], [speed], mass=100.0**k)
+    wall = {"name": "wall", "kind": "half_plane", "point": [0, 0], "normal": [-1, 0]}
+    steps = round(5.0 / speed * rate)
+    run = run_of(small, large, walls=[wall], steps=steps, rate=rate, contact={"restitution": 1.0})
+    assert len(run.impacts.step) == int(math.pi * 10**k)
+    assert run.distrust == ()
 
 
 def test_a_joint_beyond_its_limit_is_seen() -> None:
