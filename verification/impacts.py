@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reference.complementarity import ImpactProblem
-from reference.exact import exact_impact
+from reference.exact import exact_impact, exact_rank
 
 Floats = NDArray[np.floating[Any]]
 EPS = float(np.finfo(float).eps)
@@ -153,10 +153,16 @@ class ImpactCase:
 
     @cached_property
     def is_separated(self) -> bool:
-        """Whether no singular value of the unit rows lies between rounding and motion, so that the
-        rank is certain."""
-        values = self._svd[0]
-        return not np.any((values > ROUNDING_BELOW) & (values < MOTION_ABOVE))
+        """Whether the rank is certain.
+
+        No singular value of the unit rows lies between rounding and motion, and rows that are
+        dependent up to rounding are dependent exactly. A resolver in exact arithmetic takes the
+        others as independent.
+        """
+        values, rank = self._svd[0], len(self.row_space)
+        if np.any((values > ROUNDING_BELOW) & (values < MOTION_ABOVE)):
+            return False
+        return rank == len(values) or rank == exact_rank(self.contact_jacobian)
 
     @cached_property
     def is_independent(self) -> bool:
@@ -175,6 +181,13 @@ class ImpactCase:
         """Smallest singular value of the unit rows that counts as motion; 1 without rows."""
         values = self._svd[0]
         return float(np.min(values[values > RANK_CUT], initial=1.0))
+
+    @cached_property
+    def smallest_value(self) -> float:
+        """Smallest singular value of the unit rows; 0 if there are more rows than coordinates."""
+        if self.contacts > self.coordinates:
+            return 0.0
+        return float(np.min(self._svd[0], initial=1.0))
 
     @cached_property
     def largest_noise(self) -> float:
@@ -371,19 +384,28 @@ def draw_rows(
     if kind == "kinetic":  # random in the kinetic metric, so that light and heavy directions mix
         return generic @ np.linalg.cholesky(mass).T, ""
     if kind == "dependent":
-        return rng.integers(-2, 3, size=(c, rank)) @ generic[:rank], ""
+        return rng.integers(-2, 3, size=(c, rank)) @ in_few_bits(generic[:rank]), ""
     if kind == "nearly dependent":
         closeness = 10.0 ** -rng.uniform(*((3.0, 9.0) if rng.random() < 0.5 else (1.0, 16.0)))
         return generic[rng.integers(0, rank, size=c)] + closeness * generic, f" ({closeness:.0e})"
     if kind == "scaled":
         return 10.0 ** rng.uniform(-8.0, 8.0, size=(c, 1)) * generic, ""
     if kind == "copies":
-        return np.tile(generic[:rank], (int(rng.integers(2, 6)), 1)), ""
+        return np.tile(in_few_bits(generic[:rank]), (int(rng.integers(2, 6)), 1)), ""
+    if kind == "opposed":  # a body between two walls
+        half = in_few_bits(generic[: (c + 1) // 2])
+        return np.vstack([half, -half])[:c], ""
     if kind == "zeros":
         return generic * (rng.random((c, 1)) < 0.5), ""
     if kind == "cradle":
         return cradle_rows(d), ""
     return generic, ""
+
+
+def in_few_bits(numbers: Floats) -> Floats:
+    """Return the numbers rounded to multiples of 2⁻²⁰: sums and products of a few are exact, so
+    rows made of them are dependent exactly."""
+    return np.asarray(np.ldexp(np.round(np.ldexp(numbers, 20)), -20))
 
 
 def cradle_rows(d: int) -> Floats:
@@ -416,12 +438,27 @@ def draw_velocity(rng: np.random.Generator, kind: str, mass: Floats, rows: Float
 # Impacts for unilateral contacts and for friction. A textbook method uses W = J M⁻¹ Jᵀ, which
 # squares the closeness of rows, so nearly dependent rows are left out. Exact copies and sums of
 # rows, as for a face on a floor, are included.
-ONE_SIDED_ROW_KINDS = ("generic", "kinetic", "dependent", "copies", "zeros", "none", "cradle")
+ONE_SIDED_ROW_KINDS = (
+    "generic",
+    "kinetic",
+    "dependent",
+    "copies",
+    "opposed",
+    "zeros",
+    "none",
+    "cradle",
+)
 ONE_SIDED_COORDINATES, ONE_SIDED_CONTACTS = 6, 6
 ONE_SIDED_POWERS = 10  # powers of two in M and v, about ±3 decades: they reveal absolute thresholds
 SIGNS = ("approaching", "approaching", "mixed")
 SWEEPS = 2000  # a tenth of the sweeps that the solver of the reference takes
-FRICTIONAL_KINDS = ("body in the plane", "two bodies in the plane", "body in space", "generic")
+FRICTIONAL_KINDS = (
+    "body in the plane",
+    "two bodies in the plane",
+    "body in space",
+    "generic",
+    "rod in the plane",
+)
 
 
 def draw_one_sided_case(
@@ -535,8 +572,9 @@ def _bodies(rng: np.random.Generator, kind: str) -> tuple[Floats, Floats, Floats
     rigid bodies."""
     inertia = 10.0 ** rng.uniform(-1.0, 0.0, size=6)  # arms are up to 0.7 m
     if kind == "body in space":
-        frames = [np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(int(rng.integers(1, 4)))]
-        arms = rng.uniform(-0.5, 0.5, size=(len(frames), 3))
+        count = int(rng.integers(1, 4))
+        frames = in_few_bits(np.linalg.qr(rng.normal(size=(count, 3, 3)))[0])
+        arms = in_few_bits(rng.uniform(-0.5, 0.5, size=(count, 3)))
         rows = np.array(
             [[[*n, *np.cross(r, n)] for n in frame] for r, frame in zip(arms, frames, strict=True)]
         )
@@ -560,6 +598,8 @@ def _bodies(rng: np.random.Generator, kind: str) -> tuple[Floats, Floats, Floats
         )
         for arm in arms
     )
+    if kind == "rod in the plane":  # steep friction can jam it
+        return np.diag([1.0, 1.0, 0.1 * inertia[0]]), one, None
     if kind == "body in the plane":
         return np.diag([1.0, 1.0, inertia[0]]), one, None
     heavier = 10.0 ** rng.uniform(-1.0, 1.0)

@@ -60,7 +60,11 @@ class ImpactProblem:
         name: str = "",
     ) -> ImpactProblem:
         """Return the problem of an impact of velocity v (d,) on rows J (n, d) with mass matrix M
-        (d, d)."""
+        (d, d).
+
+        The contact velocities of dependent rows are made consistent: opposed rows contradict each
+        other in the rounding of J v, which is as large as |v|, and no solver finds an answer then.
+        """
         v = _array("velocity", velocity, (None,))
         mass = _array("mass_matrix", mass_matrix, (len(v), len(v)))
         jacobian = _array("contact_jacobian", contact_jacobian, (None, len(v)))
@@ -68,7 +72,7 @@ class ImpactProblem:
         contacts = _contacts(len(jacobian), contact_size, restitution, friction, relaxed, name)
         return cls(
             factor @ factor.T,
-            jacobian @ v,
+            _consistent(mass, factor, jacobian @ v),
             **contacts,
             mass_matrix=mass,
             contact_jacobian=jacobian,
@@ -208,6 +212,20 @@ def _contacts(
                 )
             found[argument] = np.ascontiguousarray(np.broadcast_to(array, rows // size))
     return found
+
+
+def _consistent(mass: Floats, factor: Floats, gamma: Floats) -> Floats:
+    """Return the contact velocities (n,) nearest to `gamma` that some motion has on the rows of A;
+    `gamma` itself if the rows are independent.
+
+    The triangular solve for A errs by n ε √κ(M): unit rows dependent to this are dependent.
+    """
+    dependent = max(*factor.shape, 1) * np.finfo(np.float64).eps * np.sqrt(np.linalg.cond(mass))
+    length = np.linalg.norm(factor, axis=1)
+    length[length == 0.0] = 1.0
+    unit = factor / length[:, None]
+    motion, _, rank, _ = np.linalg.lstsq(unit, gamma / length, rcond=float(dependent))
+    return gamma if rank == len(gamma) else np.asarray(length * (unit @ motion))
 
 
 def _mechanical_factor(mass: Floats, jacobian: Floats) -> Floats:

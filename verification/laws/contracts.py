@@ -44,9 +44,15 @@ from verification.impacts import (
     draw_frictional_case,
     draw_one_sided_case,
     draw_wide_case,
+    over,
 )
 from verification.laws.bounds import KIT, ONE_SIDED, Bounds, Found, Law, LawResidual, law
-from verification.laws.equality import COMPARING, LAWS, elastic_conserves
+from verification.laws.equality import (
+    COMPARING,
+    LAWS,
+    elastic_conserves,
+    impulse_comes_from_the_contacts,
+)
 from verification.laws.resolver import Resolver, least_push, outcome, own_outcome
 
 TOUCHING = 1e-12  # relative to ‖Aᵢ‖ |u|: a smaller normal velocity counts as zero
@@ -263,13 +269,37 @@ def elastic_approach_conserves(case: ImpactCase, resolver: Resolver, bounds: Bou
     return elastic_conserves(case, resolver, bounds) if _all_approach(case) else None
 
 
-FRICTIONAL_LAWS |= {
-    name: UNILATERAL_LAWS[name] for name in ("no_penetration", "restitution", "separating")
-}
+@law(
+    FRICTIONAL_LAWS,
+    "separating",
+    "where no contact approaches and friction cannot jam, v is left as it is",
+)
+def separating_contacts_stay_free(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
+    """As without friction, with μ reduced until v⁺ = v⁻ is the only answer.
+
+    An impulse at contacts that end with γ⁺ = 0 ≤ γ⁻ needs |Aₙᵀpₙ| ≤ |A_tᵀp_t|: Coulomb's law has a
+    second, jammed solution. With x_i = ‖A_n,i‖ p_i, σ the smallest singular value of the unit
+    normals and τ_i = μ_i ‖A_t,i‖ / ‖A_n,i‖, the left side is at least σ |x| and the right side at
+    most |τ| |x|. So |τ| < σ excludes it.
+    """
+    if case.tangents is None or case.friction is None:
+        return None
+    tangents = case.with_tangents.rows[case.contacts :].reshape(*case.tangents.shape)
+    length = np.linalg.norm(tangents, 2, axis=(1, 2))
+    steepness = over(case.friction * length, np.linalg.norm(case.rows, axis=1))
+    needed = float(np.linalg.norm(steepness))
+    room = 0.9 * case.smallest_value
+    share = 1.0 if needed <= room else room / needed
+    return separating_contacts_do_nothing(
+        replace(case, friction=share * case.friction), resolver, bounds
+    )
+
+
+FRICTIONAL_LAWS |= {name: UNILATERAL_LAWS[name] for name in ("no_penetration", "restitution")}
 # Laws that compare two calls: v⁺ of contacts that only push is unique, even if p is not.
 UNILATERAL_LAWS |= {
     name: LAWS[name]
-    for name in (*COMPARING, "arguments")
+    for name in (*COMPARING, "arguments", "new_mass")
     if name not in ("redundancy", "row_scaling")
 }
 
@@ -380,7 +410,20 @@ def _friction_power(tried: _Tried, resolver: Resolver) -> tuple[Floats, Floats]:
     return pushes * np.einsum("cm,cm->c", friction, slip), pushes * limit
 
 
-FRICTIONAL_LAWS |= {name: LAWS[name] for name in ("momentum", "repeatability", "arguments")}
+FRICTIONAL_LAWS |= {
+    name: LAWS[name] for name in ("momentum", "repeatability", "arguments", "new_mass")
+}
+
+
+@law(FRICTIONAL_LAWS, "new_friction", "an impact repeated with only μ changed, to 0: p_t = 0")
+def friction_is_not_remembered(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
+    """Part of Δu outside the span of the normals, with μ = 0 right after a call with μ."""
+    if case.friction is None or not case.friction.any():
+        return None
+    outcome(resolver, case)
+    v_plus = outcome(resolver, replace(case, friction=0.0 * case.friction))
+    smooth = replace(case, tangents=None, friction=None)
+    return impulse_comes_from_the_contacts(smooth, lambda *given: v_plus, bounds)
 
 
 def no_gain_in_real_arithmetic(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual:

@@ -1,21 +1,202 @@
-"""Counterexamples: shrink a failing impact, and write it as a test."""
+"""Counterexamples: find one that a fresh resolver fails, shrink it, and write it as a test."""
 
 from __future__ import annotations
 
+import pickle
 import sys
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
+from itertools import groupby
 from typing import Any
 
 import numpy as np
 
 from reference.exact import independent_rows
-from verification.impacts import ImpactCase
-from verification.laws.bounds import FACTORED, KIT, ONE_SIDED, Bounds
+from verification.impacts import Floats, ImpactCase
+from verification.laws.bounds import FACTORED, KIT, ONE_SIDED, Bounds, Law, LawResidual
+from verification.laws.child import Child
 from verification.laws.contracts import CONTRACTS, EXACT_LAWS
+from verification.laws.resolver import Resolver, ResolverFault, answer_of
 
+# the search prefers counterexamples with a residual above this, which rounding cannot explain
+NOTABLE = 1e-6
+HANGS = "gave no"  # kind of the fault of a call that takes too long
 _DIGITS = (0, 1, 2, 4, 8)
+
+
+@dataclass(frozen=True, eq=False)
+class Counterexample:
+    """An impact that breaks a law.
+
+    Attributes
+    ----------
+    case, law : the impact, and the name of the law.
+    fault : why the resolver's answer is unusable; "" if the answer breaks the law.
+    calls : arguments, and v⁺ or fault, of each call that the law makes for this impact.
+    earlier : pickled arguments of calls before these; without them a fresh resolver keeps the law.
+    fresh : whether a fresh resolver was seen to break the law; None if none could be made.
+    """
+
+    case: ImpactCase
+    law: str
+    fault: str = ""
+    calls: tuple[tuple[tuple[Any, ...], Floats | str], ...] = ()
+    earlier: tuple[bytes, ...] = ()
+    fresh: bool | None = None
+
+    @property
+    def title(self) -> str:
+        """What the counterexample shows."""
+        title = f"counterexample to {self.law}"
+        if self.earlier:
+            return f"{title}, which depends on earlier calls ({len(self.earlier)} in the test)"
+        if self.fresh is False:
+            return f"{title}, which depends on earlier calls: a fresh resolver keeps the law here"
+        if self.law.endswith("repeatability"):
+            return f"{title}: v⁺ depends on earlier calls"
+        return title
+
+
+def residual_of(
+    law: Law, case: ImpactCase, resolver: Resolver, bounds: Bounds
+) -> tuple[LawResidual | None, str]:
+    """Return the law's residual and ""; if the answer is unusable, an infinite residual and the
+    resolver's fault."""
+    try:
+        return law.check(case, resolver, bounds), ""
+    except ResolverFault as fault:
+        return LawResidual("", np.inf, 0.0), str(fault)
+
+
+def kind_of(fault: str) -> str:
+    """Return the kind of a fault: its first two words, such as "raised ValueError:"."""
+    return " ".join(fault.split()[:2])
+
+
+class Hunt:
+    """The search for an impact that breaks a law, by the same kind of fault as the impact drawn.
+
+    child : makes fresh resolvers, and makes the calls; None if the resolver itself is called.
+    ends : time of `time.monotonic` at which the search ends.
+    tell : called at each try.
+    """
+
+    def __init__(
+        self,
+        law: Law,
+        fault: str,
+        bounds: Bounds,
+        resolver: Resolver,
+        child: Child | None,
+        ends: float,
+        tell: Callable[[], None],
+    ) -> None:
+        self.law, self.kind, self.bounds = law, kind_of(fault), bounds
+        self.resolver, self.child = child or resolver, child
+        self.ends, self.tell = ends, tell
+
+    def breaks(
+        self, case: ImpactCase, least: float = 0.0, earlier: Sequence[bytes] | None = None
+    ) -> bool:
+        """Whether the impact breaks the law with a residual of `least` or more; if `earlier` calls
+        are given, by a fresh resolver after these calls."""
+        self.tell()
+        if time.monotonic() > self.ends or (earlier is not None and not self.replays(earlier)):
+            return False
+        residual, fault = residual_of(self.law, replace(case), self.resolver, self.bounds)
+        if residual is None or residual.passed or kind_of(fault) != self.kind:
+            return False
+        return bool(fault) or not residual.value < least
+
+    def replays(self, earlier: Sequence[bytes]) -> bool:
+        """Make the calls with a fresh resolver; whether it answers all of them."""
+        if self.child is None:
+            return False
+        self.child.restart()
+        answers = (answer_of(self.child, pickle.loads(call)) for call in earlier)
+        return not any(isinstance(answer, ResolverFault) for answer in answers)
+
+    def smallest(
+        self,
+        drawn: Sequence[ImpactCase],
+        search: Callable[[Callable[[ImpactCase], bool]], ImpactCase | None],
+    ) -> ImpactCase | None:
+        """Return a small impact that a fresh resolver fails; None if there is none without earlier
+        calls."""
+        for least in (NOTABLE, 0.0):
+            fails = partial(self.breaks, least=least)
+            found = search(fails)
+            failing = [case for case in (found, *drawn) if case is not None and fails(case)]
+            if failing:
+                smallest = shrink(min(failing, key=_size), fails)
+                if self.child is None or self.breaks(smallest, least, ()):
+                    return smallest
+            fails = partial(self.breaks, least=least, earlier=())
+            failing = [case for case in drawn if fails(case)]
+            if failing:
+                return shrink(min(failing, key=_size), fails)
+        return None
+
+    def after_calls(
+        self, case: ImpactCase, calls: Sequence[bytes]
+    ) -> tuple[ImpactCase, tuple[bytes, ...]] | None:
+        """Return an impact that a fresh resolver fails after some of these calls, and those; None if
+        it keeps the law after all of them."""
+        own = pickle.dumps(case.given())
+        before = [list(calls)]
+        if own in calls:
+            before.insert(0, before[0][: len(calls) - 1 - calls[::-1].index(own)])
+        earlier = next((tried for tried in before if self.breaks(case, earlier=tried)), None)
+        if earlier is None:
+            return None
+        for count in (1, len(earlier)):  # the same call again and again says it best
+            if self.repeats(count, case):
+                again = shrink(case, partial(self.repeats, count))
+                return again, tuple(_again(again, count))
+        size = len(earlier) // 2
+        while size:
+            first = 0
+            while first < len(earlier):
+                fewer = earlier[:first] + earlier[first + size :]
+                if self.breaks(case, earlier=fewer):
+                    earlier = fewer
+                else:
+                    first += size
+            size //= 2
+        return shrink(case, partial(self.breaks, earlier=earlier)), tuple(earlier)
+
+    def repeats(self, count: int, case: ImpactCase) -> bool:
+        """Whether a fresh resolver breaks the law after the impact's own call, `count` times."""
+        return self.breaks(case, earlier=_again(case, count))
+
+    def calls_for(
+        self, case: ImpactCase, earlier: Sequence[bytes]
+    ) -> tuple[tuple[tuple[Any, ...], Floats | str], ...]:
+        """Return the calls that the law makes for the impact, each with its answer or fault."""
+        calls: list[tuple[tuple[Any, ...], Floats | str]] = []
+
+        def recorded(*given: Any) -> Floats:
+            kept = pickle.loads(pickle.dumps(given))
+            answer = answer_of(self.resolver, given)
+            if isinstance(answer, ResolverFault):
+                calls.append((kept, str(answer)))
+                raise answer
+            calls.append((kept, answer))
+            return answer
+
+        self.replays(earlier)
+        residual_of(self.law, replace(case), recorded, self.bounds)
+        return tuple(calls)
+
+
+def _again(case: ImpactCase, count: int) -> list[bytes]:
+    return [pickle.dumps(case.given())] * count
+
+
+def _size(case: ImpactCase) -> int:
+    return case.coordinates + case.contacts
 
 
 def shrink(case: ImpactCase, fails: Callable[[ImpactCase], bool]) -> ImpactCase:
@@ -114,9 +295,14 @@ def as_test(
     bounds: Bounds = KIT,
     resolver: Any = None,
     contract: str = "equality",
+    earlier: Sequence[bytes] = (),
+    limit: float = np.inf,
 ) -> str:
     """Return the source code of a test of `law` on the case; if the resolver cannot be imported,
-    its line is a gap."""
+    its line is a gap.
+
+    The test makes the `earlier` calls first. A finite `limit` [s] ends a call that hangs.
+    """
     arrays = {
         "mass_matrix": case.mass_matrix,
         "contact_jacobian": case.contact_jacobian,
@@ -136,15 +322,36 @@ def as_test(
         f"from verification.laws.bounds import {name or 'Bounds'}",
         import_line(resolver) or "\n# resolver = ...  the one under test",
     ]
+    called = "resolver"
+    if limit < np.inf:
+        head.insert(2, "from verification.laws.child import Child")
+        called = f"Child(resolver, {limit!r})"
     lines = [
         "",
         "",
         f"def test_{law}():",
+        *_repeating(earlier),
         *(f"    {key} = {_written(array)}" for key, array in (arrays | optional).items()),
         f"    case = ImpactCase(mass_matrix, contact_jacobian, velocity, {case.restitution!r}{more})",
-        f"    residual = {table}[{law!r}].check(case, resolver, {tolerances})",
+        f"    residual = {table}[{law!r}].check(case, {called}, {tolerances})",
     ]
     return "\n".join(["import numpy as np", *head, *lines, "    assert residual.passed, residual"])
+
+
+def _repeating(earlier: Sequence[bytes]) -> Iterator[str]:
+    """Yield lines that make the earlier calls, each followed by itself in a loop."""
+    if earlier:
+        yield "    # the failure depends on these calls before it"
+    for pickled, same in groupby(earlier):
+        count, indent = len(list(same)), "    "
+        if count > 1:
+            yield f"    for _ in range({count}):"
+            indent = 2 * indent
+        yield f"{indent}resolver("
+        for value in pickle.loads(pickled):
+            text = _written(value) if isinstance(value, np.ndarray) else repr(value)
+            yield f"{indent}    {text},"
+        yield f"{indent})"
 
 
 def import_line(resolver: Any) -> str:

@@ -19,10 +19,9 @@ from iapb.run import Run
 from reference.one_thread import one_thread
 from verification.impacts import ImpactCase, draw_case, with_unequal_restitution
 from verification.laws.bounds import FACTORED, KIT, Bounds, LawCount, LawResidual
-from verification.laws.counterexample import as_test, shrink
+from verification.laws.counterexample import as_test, residual_of, shrink
 from verification.laws.engine import ENGINE_LAWS
 from verification.laws.equality import LAWS, OF_ONE_CALL, UNEQUAL_LAWS
-from verification.laws.kit import residual_of
 from verification.laws.resolver import Resolver
 from verification.laws.scenes import draw_scene, draw_spatial_scene
 from verification.laws.trajectories import judge_run

@@ -6,7 +6,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
-from functools import partial
 from importlib.util import find_spec
 from inspect import signature
 from typing import Any, NamedTuple
@@ -24,17 +23,28 @@ from verification.impacts import (
     ImpactCase,
     with_unequal_restitution,
 )
-from verification.laws.bounds import KIT, Bounds, Law, LawCount, LawResidual
+from verification.laws.bounds import KIT, Bounds, Law, LawCount
+from verification.laws.child import Child, child_of, shown_arguments
 from verification.laws.contracts import CONTRACTS, EXACT_LAWS, OF_VARIANTS, Contract
-from verification.laws.counterexample import as_test, name_of, shrink
+from verification.laws.counterexample import (
+    HANGS,
+    NOTABLE,
+    Counterexample,
+    Hunt,
+    as_test,
+    kind_of,
+    name_of,
+    residual_of,
+)
 from verification.laws.equality import OF_ONE_CALL, UNEQUAL_LAWS
-from verification.laws.resolver import Resolver, ResolverFault, Watched, own_answer
+from verification.laws.resolver import Resolver, Watched
 
-# the search prefers counterexamples with a residual above this, which rounding cannot explain
-NOTABLE = 1e-6
-SINGLE = 3  # broken laws from which an answer in single precision is named as the probable cause
 IMPACTS = 5000  # default: about a minute for a resolver that takes 50 µs per call
 PATIENCE = 600.0  # [s] ten times as long
+CALL_LIMIT = 60.0  # [s]
+SHRINKING = 30.0  # [s] for a counterexample
+LITTLE_TIME = 2.0  # [s] for it where the patience is at its end
+ITERATED = 1e-4  # largest residual that the accuracy of an iteration may explain
 
 
 @dataclass
@@ -53,6 +63,9 @@ class LawVerdict(LawCount):
     smallest_case : the impact with the fewest coordinates and contacts that breaks the law; impacts
         with a residual of 1e-6 or more take precedence.
     fault : first message if the resolver raised an exception or returned an unusable value.
+    fault_case : the impact of this message; the other cases are those of usable answers.
+    first_calls : by `fault_case` or not, the first impact that broke the law, and the pickled
+        arguments of the calls until then.
     error : exception that the law itself raised, after which it was not tried again; else None.
     """
 
@@ -64,6 +77,10 @@ class LawVerdict(LawCount):
     error: Exception | None = None
     severe: int = 0
     smallest_case: ImpactCase | None = None
+    fault_case: ImpactCase | None = None
+    first_calls: dict[bool, tuple[ImpactCase, list[bytes]]] = field(
+        default_factory=dict, repr=False
+    )
     _largest_failure: float = field(default=-np.inf, repr=False)
     _smallest: tuple[bool, int] = field(
         default=(True, 0), repr=False
@@ -97,9 +114,14 @@ class LawVerdict(LawCount):
         if self.worst is residual:
             self.worst_case = case
         self.severe += residual.severe
-        self.fault = self.fault or complaint
         self.largest = max(self.largest, residual.value)
         if passed:
+            return
+        if bool(complaint) not in self.first_calls and isinstance(resolver, Watched):
+            self.first_calls[bool(complaint)] = case, list(resolver.calls)
+        if complaint:
+            if self.fault_case is None:
+                self.fault, self.fault_case = complaint, case
             return
         if self.largest_case is None or residual.value > self._largest_failure:
             self._largest_failure, self.largest_case = residual.value, case
@@ -117,25 +139,25 @@ class PassivityReport(str):
     ----------
     impacts : number of random impacts tried, not counting the contract's fixed first ones.
     unfinished : why fewer impacts were tried than requested; empty if all were tried.
-    counterexample, counterexample_law : smallest counterexample found, for the first broken law;
-        None if there is none.
-    returned : (d,) v⁺ that the resolver gave for the counterexample, or a text that says why its
-        answer is unusable.
+    found : smallest counterexample to the first law that an answer broke, and to the first law for
+        which an answer was unusable.
+    hints : probable causes that are no fault of the resolver's law.
     contract : contract that the resolver was tested against; see `verification.laws.contracts`.
     tested : the resolver, for the import line of the generated test.
+    call_limit : [s] limit of one call.
     """
 
     resolver: str
     impacts: int
     seed: int
     verdicts: tuple[LawVerdict, ...]
-    counterexample: ImpactCase | None
-    counterexample_law: str
+    found: tuple[Counterexample, ...] = ()
+    hints: tuple[str, ...] = ()
     unfinished: str = ""
     bounds: Bounds = KIT
     tested: Any = None
     contract: str = "equality"
-    returned: Floats | str = ""
+    call_limit: float = CALL_LIMIT
 
     def __new__(cls, *fields: Any, **named: Any) -> PassivityReport:
         """Make the string from the text of the fields."""
@@ -181,12 +203,32 @@ class PassivityReport(str):
             raise AssertionError(str(self))
 
     @property
-    def counterexample_test(self) -> str:
-        """The counterexample as source code of a test, or an empty text if there is none."""
-        if self.counterexample is None:
+    def counterexample(self) -> ImpactCase | None:
+        """The impact of the first counterexample; None if there is none."""
+        return self.found[0].case if self.found else None
+
+    @property
+    def counterexample_law(self) -> str:
+        """Name of the law that the first counterexample breaks; "" if there is none."""
+        return self.found[0].law if self.found else ""
+
+    @property
+    def returned(self) -> Floats | str:
+        """v⁺ (d,) of the law's first call for the counterexample, or why it is unusable."""
+        if not self.found:
             return ""
+        return self.found[0].calls[0][1] if self.found[0].calls else self.found[0].fault
+
+    @property
+    def counterexample_test(self) -> str:
+        """The first counterexample as source code of a test, or an empty text if there is none."""
+        return self.test_of(self.found[0]) if self.found else ""
+
+    def test_of(self, one: Counterexample) -> str:
+        """Return a counterexample as source code of a test."""
+        limit = self.call_limit if kind_of(one.fault) == HANGS else np.inf
         return as_test(
-            self.counterexample, self.counterexample_law, self.bounds, self.tested, self.contract
+            one.case, one.law, self.bounds, self.tested, self.contract, one.earlier, limit
         )
 
     def _text(self) -> str:
@@ -204,66 +246,19 @@ class PassivityReport(str):
             lines.append(
                 f"  worst case: {worst.law} at {worst.worst.ratio:.2g} of its tolerance, {family}"
             )
-        lines += [f"  hint: {hint}" for hint in self._hints()]
-        if self.counterexample is not None:
-            lines += [
-                "",
-                f"counterexample to {self.counterexample_law}:",
-                *_shown(self.counterexample, self.returned),
-            ]
-            lines += ["", "as a test:", "", self.counterexample_test]
+        lines += [f"  hint: {hint}" for hint in self.hints]
+        for one in self.found:
+            lines += ["", f"{one.title}:", *_shown(one), "", "as a test:", "", self.test_of(one)]
         return "\n".join(lines)
 
-    def _hints(self) -> Iterator[str]:
-        """Yield probable causes of failures that are no fault of the resolver's law."""
-        answer, case, broken = self.returned, self.counterexample, self.broken_laws
-        with np.errstate(over="ignore"):
-            single = not isinstance(answer, str) and np.array_equal(
-                np.asarray(answer, np.float32), answer
-            )
-        if len(broken) >= SINGLE and single:
-            yield (
-                "the resolver seems to compute in single precision, the tolerances are for double "
-                "precision. Widen "
-                "them: bounds=dataclasses.replace(verification.laws.bounds.KIT, least=1e-4, "
-                "restitution=1e-4), "
-                "largest_condition=100"
-            )
-        if (
-            "kinetic_energy" in broken[:1]
-            and case
-            and case.friction is not None
-            and case.restitution > 0.0
-        ):
-            yield (
-                "with e > 0, Coulomb's friction and Newton's restitution together can gain "
-                "energy, whatever the "
-                "solver (Kane and Levinson 1985). `laws` can leave kinetic_energy out"
-            )
 
-
-def _shown(case: ImpactCase, returned: Floats | str) -> Iterator[str]:
-    """Yield lines with every argument of the case and with the returned value."""
-    names = ("M", "J", "v", "e") if case.tangents is None else ("M", "J", "T", "v", "e", "μ")
-    for name, value in (*zip(names, case.given(), strict=True), ("returned", returned)):
-        text = (
-            value
-            if isinstance(value, str)
-            else np.array2string(np.asarray(value), precision=9, threshold=400)
-        )
-        lead = f"  {name} = "
-        yield lead + text.replace("\n", "\n" + " " * len(lead))
-
-
-def residual_of(
-    law: Law, case: ImpactCase, resolver: Resolver, bounds: Bounds
-) -> tuple[LawResidual | None, str]:
-    """Return the law's residual and ""; if the answer is unusable, an infinite residual and the
-    resolver's fault."""
-    try:
-        return law.check(case, resolver, bounds), ""
-    except ResolverFault as fault:
-        return LawResidual("", np.inf, 0.0), str(fault)
+def _shown(one: Counterexample) -> Iterator[str]:
+    """Yield lines with the arguments and the answer of each call that the law makes."""
+    calls = one.calls or ((one.case.given(), one.fault),)
+    for number, (given, answer) in enumerate(calls, 1):
+        if len(calls) > 1:
+            yield f"call {number} of {len(calls)} that the law makes:"
+        yield from shown_arguments(given, answer)
 
 
 def check_passivity(
@@ -278,6 +273,8 @@ def check_passivity(
     largest_condition: float | None = None,
     unequal_restitution: bool = False,
     patience: float = PATIENCE,
+    call_limit: float = CALL_LIMIT,
+    own_process: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> PassivityReport:
     """Run the laws of a contract against `resolver` and return the report.
@@ -309,7 +306,13 @@ def check_passivity(
         range(Jᵀ), momentum, repeatable bits, unchanged arguments.
     patience : time limit [s] after which no further impact is tried; the report then fails and says
         why.
-    progress : called with (impacts done, impacts) after each impact.
+    call_limit : time limit [s] of one call. A call that takes longer is named on stderr with its
+        impact, while it runs.
+    own_process : whether the resolver is called in a process of its own. A call that takes longer
+        than `call_limit` is then ended and breaks the laws, as does one that ends the process. Each
+        call takes 0.1 ms longer, and what the resolver remembers is not seen here.
+    progress : called with (impacts done, impacts) after each impact, then with (seconds, most
+        seconds) while a counterexample is searched.
 
     Returns
     -------
@@ -343,42 +346,31 @@ def check_passivity(
     terms = CONTRACTS[contract]
     bounds = terms.bounds if bounds is None else bounds
     condition = terms.largest_condition if largest_condition is None else largest_condition
-    trial = _Trial(
-        resolver,
-        bounds,
-        terms,
-        int(impacts),
-        seed,
-        condition,
-        chosen,
-        {name: LawVerdict(name, statement=law.statement) for name, law in chosen.items()},
-    )
-    with one_thread():
+    verdicts = {name: LawVerdict(name, statement=law.statement) for name, law in chosen.items()}
+    with child_of(resolver, call_limit, name_of(resolver)) as child, one_thread():
+        if own_process and child is None:
+            raise ArgumentError("own_process", True, "False where no process can be forked")
+        called = child if own_process and child else resolver
+        watched = Watched(called, child.note if child and not own_process else None)
+        trial = _Trial(watched, bounds, terms, int(impacts), seed, condition, chosen, verdicts)
         done = _try_all(trial, ends, progress)
-        verdicts = tuple(trial.verdicts.values())
-        broken = next((verdict for verdict in verdicts if not verdict.passed), None)
-        example = (
-            None
-            if broken is None
-            else _counterexample(
-                chosen[broken.law], broken, resolver, bounds, search, seed, ends, contract
-            )
-        )
-        returned = "" if example is None else own_answer(resolver, example)[0]
+        hunts = _Hunts(trial, resolver, child, search, contract, ends, progress)
+        found = tuple(_counterexamples(hunts))
+        hints = tuple(_hints(hunts, found))
+        watched.forget()
     late = "" if done == impacts else f"too slow: {done} of {impacts} impacts in {patience:g} s"
-    law = broken.law if broken else ""
     return PassivityReport(
         name_of(resolver),
         done,
         seed,
-        verdicts,
-        example,
-        law,
+        tuple(verdicts.values()),
+        found,
+        hints,
         late,
         bounds,
         resolver,
         contract,
-        str(returned) if isinstance(returned, ResolverFault) else returned,
+        call_limit,
     )
 
 
@@ -446,7 +438,7 @@ def choose_laws(
 class _Trial(NamedTuple):
     """A resolver, the impacts that it gets, the laws that are tried, and their verdicts so far."""
 
-    resolver: Resolver
+    resolver: Watched
     bounds: Bounds
     contract: Contract
     impacts: int
@@ -459,7 +451,7 @@ class _Trial(NamedTuple):
 def _try_all(trial: _Trial, ends: float, progress: Callable[[int, int], None] | None) -> int:
     """Check every impact against its laws; return the number of random impacts tried within the
     time limit."""
-    watched, rng = Watched(trial.resolver), np.random.default_rng([trial.seed, 3])
+    watched, rng = trial.resolver, np.random.default_rng([trial.seed, 3])
     for done, case, mixed in _drawn(trial):
         large = case.coordinates >= LARGE_COORDINATES[0] or case.contacts >= LARGE_CONTACTS[0]
         for k, name in enumerate(trial.laws):
@@ -521,40 +513,102 @@ def _drawn(trial: _Trial) -> Iterator[tuple[int, ImpactCase, ImpactCase]]:
         yield number + 1, case, with_unequal_restitution(other, case) if unequal else case
 
 
+class _Hunts(NamedTuple):
+    """What the searches for counterexamples share."""
+
+    trial: _Trial
+    resolver: Resolver
+    child: Child | None
+    search: int
+    contract: str
+    ends: float
+    progress: Callable[[int, int], None] | None
+
+    def begin(self, law: str, fault: str = "") -> Hunt:
+        """Begin the search for a counterexample to a law."""
+        began = time.monotonic()
+        seconds = min(SHRINKING, max(LITTLE_TIME, self.ends - began))
+
+        def tell() -> None:
+            if self.progress is not None:
+                spent = min(time.monotonic() - began, seconds)
+                self.progress(int(spent), int(seconds))
+
+        bounds = self.trial.bounds
+        ends = began + seconds
+        return Hunt(self.trial.laws[law], fault, bounds, self.resolver, self.child, ends, tell)
+
+
+def _counterexamples(hunts: _Hunts) -> Iterator[Counterexample]:
+    """Yield a counterexample to the first law that an answer broke, and one to the first law for
+    which the resolver gave no usable answer."""
+    verdicts = hunts.trial.verdicts.values()
+    for broken in verdicts:
+        if broken.smallest_case is not None and broken.largest_case is not None:
+            drawn = broken.smallest_case, broken.largest_case
+            yield _counterexample(broken, drawn, "", hunts)
+            break
+    for broken in verdicts:
+        if broken.fault_case is not None:
+            yield _counterexample(broken, (broken.fault_case,), broken.fault, hunts)
+            break
+
+
 def _counterexample(
-    law: Law,
-    broken: LawVerdict,
-    resolver: Resolver,
-    bounds: Bounds,
-    search: int,
-    seed: int,
-    ends: float,
-    contract: str,
-) -> ImpactCase | None:
-    """Return the smallest counterexample that hypothesis or the drawn impacts give, shrunk until
-    the time limit."""
+    broken: LawVerdict, drawn: tuple[ImpactCase, ...], fault: str, hunts: _Hunts
+) -> Counterexample:
+    """Return the smallest counterexample that hypothesis or the drawn impacts give, shrunk."""
+    if kind_of(fault) == HANGS:
+        return Counterexample(drawn[0], broken.law, fault)
+    hunt = hunts.begin(broken.law, fault)
+    kind = "unequal" if broken.law in UNEQUAL_LAWS else hunts.contract
 
-    def breaks(case: ImpactCase, least: float) -> bool:
-        if time.monotonic() > ends:
-            return False
-        residual, _ = residual_of(law, case, resolver, bounds)
-        return residual is not None and not residual.passed and not residual.value < least
+    def search(fails: Callable[[ImpactCase], bool]) -> ImpactCase | None:
+        from verification.laws.strategies import search_counterexample  # brings hypothesis
 
-    kind = "unequal" if broken.law in UNEQUAL_LAWS else contract
-    from verification.laws.strategies import search_counterexample  # brings hypothesis
+        examples, seed = hunts.search, hunts.trial.seed
+        return search_counterexample(fails, examples, seed, kind) if examples else None
 
-    for least in (NOTABLE, 0.0):
-        fails = partial(breaks, least=least)
-        found = (
-            search_counterexample(fails, search, seed, kind)
-            if search and time.monotonic() < ends
-            else None
+    case, earlier = hunt.smallest(drawn, search), tuple[bytes, ...]()
+    fresh = None if hunts.child is None else case is not None
+    if case is None:
+        later = hunt.after_calls(*broken.first_calls[bool(fault)])
+        if later is not None:
+            (case, earlier), fresh = later, True
+    case = drawn[0] if case is None else case
+    calls = hunt.calls_for(case, earlier)
+    return Counterexample(case, broken.law, fault, calls, earlier, fresh)
+
+
+def _hints(hunts: _Hunts, found: tuple[Counterexample, ...]) -> Iterator[str]:
+    """Yield probable causes of failures that are no fault of the resolver's law."""
+    watched, verdicts = hunts.trial.resolver, hunts.trial.verdicts.values()
+    broken = [verdict for verdict in verdicts if not verdict.passed]
+    largest = max((verdict.largest for verdict in broken), default=0.0)
+    table = "KIT" if hunts.contract == "equality" else "ONE_SIDED"
+    wider, cause = 0.0, ""
+    if broken and 0 < watched.changed == watched.rounded:
+        wider, cause = 1e-4, "The resolver computes in single precision (set largest_condition=100)"
+    elif 0.0 < largest < ITERATED:
+        wider = 10.0 ** np.ceil(np.log10(largest))
+        cause = f"No error is above {wider:.0e}, which an iteration that ends early can explain"
+    if cause:
+        yield (
+            f"{cause}. Widen the tolerances: bounds=dataclasses.replace(verification.laws.bounds."
+            f"{table}, least={wider:.0e}, restitution={wider:.0e}). Errors below {wider:.0e} of v "
+            "are not noticed then"
         )
-        drawn = [
-            case
-            for case in (broken.smallest_case, broken.largest_case)
-            if case is not None and fails(case)
-        ]
-        if failing := drawn if found is None else [found, *drawn]:
-            return shrink(min(failing, key=lambda case: case.coordinates + case.contacts), fails)
-    return None
+    case = found[0].case if found else None
+    if [verdict.law for verdict in broken] != ["kinetic_energy"] or case is None:
+        return
+    if case.friction is None or not case.friction.any() or case.restitution == 0.0:
+        return
+    hunt = hunts.begin("kinetic_energy")
+    without = replace(case, restitution=0.0), replace(case, friction=0.0 * case.friction)
+    if hunt.breaks(case, earlier=() if hunts.child else None) and not any(
+        hunt.breaks(one) for one in without
+    ):
+        yield (
+            "with e > 0, Coulomb's friction and Newton's restitution together can gain energy, "
+            "whatever the solver (Kane and Levinson 1985). `laws` can leave kinetic_energy out"
+        )

@@ -106,6 +106,19 @@ def makes_warm_start() -> Resolver:
     return warm_start
 
 
+def makes_stale_answers() -> Resolver:
+    """Returns a resolver that knows an impact by J, v and e, so a new M changes nothing."""
+    known: dict[tuple[bytes, bytes, float], Floats] = {}
+
+    def stale_answers(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+        key = J.tobytes(), v.tobytes(), e
+        if key not in known:
+            known[key] = sound_resolver(M, J, v, e)
+        return known[key]
+
+    return stale_answers
+
+
 def writes_on_its_arguments(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
     v[:] = sound_resolver(M, J, v, e)
     return v
@@ -154,6 +167,7 @@ PLANTED_BUGS: dict[str, Fault] = {
     "groups": Fault("three_rows_at_most", three_rows_at_most),
     "repeatability": Fault("warm_start", makes_warm_start, remembers=True),
     "arguments": Fault("writes_on_its_arguments", writes_on_its_arguments),
+    "new_mass": Fault("stale_answers", makes_stale_answers, remembers=True),
 }
 
 

@@ -3,6 +3,8 @@ independent of the engine."""
 
 from __future__ import annotations
 
+import pickle
+from collections import deque
 from collections.abc import Callable
 from functools import wraps
 from typing import Any
@@ -15,6 +17,7 @@ from verification.impacts import Floats, ImpactCase
 Resolver = Callable[..., Any]  # called with `ImpactCase.given()`
 # relative gain in plain doubles; for κ(M) well above 1e4 the kit's bounds allow more than this
 SUSPICIOUS = 1e-9
+REMEMBERED = 2000  # calls that a `Watched` resolver remembers
 
 
 class ResolverFault(IapbError):
@@ -26,18 +29,40 @@ class Watched:
 
     suspects : (case, v⁺) of answers that seem to gain energy in plain doubles; the kit checks them
         in double-double.
+    calls : the pickled arguments of the last calls.
+    changed, rounded : answers other than v⁻ and 0, and those of them that fit in single precision.
+    note : told the pickled arguments before each call, and b"" after it.
     """
 
-    def __init__(self, resolver: Resolver) -> None:
-        self.resolver = resolver
+    def __init__(self, resolver: Resolver, note: Callable[[bytes], None] | None = None) -> None:
+        self.resolver, self.note = resolver, note
         self.suspects: list[tuple[ImpactCase, Floats]] = []
+        self.calls: deque[bytes] = deque(maxlen=REMEMBERED)
+        self.changed, self.rounded = 0, 0
 
     def __call__(self, *given: Any) -> Any:
-        return self.resolver(*given)
+        pickled = pickle.dumps(given)
+        self.calls.append(pickled)
+        if self.note is None:
+            return self.resolver(*given)
+        self.note(pickled)
+        try:
+            return self.resolver(*given)
+        finally:
+            self.note(b"")
+
+    def forget(self) -> None:
+        """Drop what belongs to the check: reports travel between processes."""
+        self.resolver, self.note = print, None
+        self.calls.clear()
 
     def look_at(self, case: ImpactCase, v_plus: Floats) -> None:
-        """Add the answer to `suspects` if its kinetic energy exceeds that before the impact by more
-        than SUSPICIOUS."""
+        """Count the answer, and add it to `suspects` if its kinetic energy exceeds that before the
+        impact by more than SUSPICIOUS."""
+        if v_plus.any() and not np.array_equal(v_plus, case.velocity):
+            with np.errstate(over="ignore"):
+                self.rounded += np.array_equal(np.asarray(v_plus, np.float32), v_plus)
+            self.changed += 1
         before = float(case.velocity @ (case.mass_matrix @ case.velocity))
         after = float(v_plus @ (case.mass_matrix @ v_plus))
         if not after <= before * (1.0 + SUSPICIOUS):
@@ -70,6 +95,32 @@ def outcome(resolver: Resolver, case: ImpactCase) -> Floats:
     return _usable(_velocity(resolver, case.given(), case))
 
 
+def answer_of(resolver: Resolver, given: tuple[Any, ...]) -> Floats | ResolverFault:
+    """Return a copy of v⁺ (d,) for these arguments, or the fault of a resolver that raises or gives
+    an unusable answer."""
+    shape = given[0].shape[:1]
+    try:
+        answer = resolver(*given)
+    except ResolverFault as fault:
+        return fault
+    except (
+        Exception
+    ) as error:  # a foreign resolver may raise anything: that is its fault, not an error of the kit
+        return ResolverFault(f"raised {type(error).__name__}: {error}")
+    try:
+        velocity = np.asarray(getattr(answer, "velocity", answer))
+    except Exception as error:  # as foreign as the resolver
+        return ResolverFault(f"returned {type(answer).__name__}, which is no array: {error}")
+    if velocity.dtype.kind not in "fiu" or velocity.shape != shape:
+        return ResolverFault(
+            f"returned {velocity.dtype} of shape {velocity.shape}, not float {shape}"
+        )
+    velocity = velocity.astype(np.float64)
+    if not np.all(np.isfinite(velocity)):
+        return ResolverFault("returned a velocity that is not finite")
+    return velocity
+
+
 def _usable(velocity: Floats | ResolverFault) -> Floats:
     if isinstance(velocity, ResolverFault):
         raise velocity
@@ -79,25 +130,9 @@ def _usable(velocity: Floats | ResolverFault) -> Floats:
 def _velocity(
     resolver: Resolver, given: tuple[Any, ...], case: ImpactCase
 ) -> Floats | ResolverFault:
-    """Return a copy of v⁺, or the fault of a resolver that raises or gives an unusable answer."""
-    try:
-        answer = resolver(*given)
-    except (
-        Exception
-    ) as error:  # a foreign resolver may raise anything: that is its fault, not an error of the kit
-        return ResolverFault(f"raised {type(error).__name__}: {error}")
-    try:
-        velocity = np.asarray(getattr(answer, "velocity", answer))
-    except Exception as error:  # as foreign as the resolver
-        return ResolverFault(f"returned {type(answer).__name__}, which is no array: {error}")
-    if velocity.dtype.kind not in "fiu" or velocity.shape != case.velocity.shape:
-        return ResolverFault(
-            f"returned {velocity.dtype} of shape {velocity.shape}, not float {case.velocity.shape}"
-        )
-    velocity = velocity.astype(np.float64)
-    if not np.all(np.isfinite(velocity)):
-        return ResolverFault("returned a velocity that is not finite")
-    if isinstance(resolver, Watched):
+    """Return v⁺ or the fault; a `Watched` resolver looks at the answer."""
+    velocity = answer_of(resolver, given)
+    if isinstance(resolver, Watched) and not isinstance(velocity, ResolverFault):
         resolver.look_at(case, velocity)
     return velocity
 

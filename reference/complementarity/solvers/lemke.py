@@ -2,8 +2,8 @@
 b) = 0.
 
 Source: Lemke, Management Science 11 (1965); Cottle, Pang, Stone, Linear Complementarity (1992),
-4.4. With a semidefinite, degenerate W, rounding can end a solvable problem on a ray; the answer
-then reports this.
+4.4. With a semidefinite, degenerate W, rounding can end a solvable problem on a ray; a W that is
+larger by 1e-13 on its diagonal is tried then.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from reference.complementarity.problem import ImpactProblem
 from reference.complementarity.solution import Answer, velocity_scale
 from reference.complementarity.solvers import import_alone
 
+_SOFTER = 1e-13  # added to the diagonal of a unit W
 _STATUS = {0: "solution found", 1: "iteration limit", 2: "ray termination"}
 
 
@@ -33,5 +34,8 @@ def solve(problem: ImpactProblem) -> Answer:
         velocity_scale(problem),
     )
     result = lcp_lemke(problem.delassus / inertia, problem.offset / speed)
+    if not result.success:  # a W without zero eigenvalues has no rays
+        softer = problem.delassus / inertia + _SOFTER * np.eye(problem.size)
+        result = lcp_lemke(softer, problem.offset / speed)
     note = f"{_STATUS.get(result.status, result.status)} after {result.num_iter} pivots"
     return Answer(result.z * speed / inertia if result.success else None, note)

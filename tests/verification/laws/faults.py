@@ -165,6 +165,19 @@ def friction_of_one_alone(
     return moreau(M, J, T, v, e, mu if len(J) == 1 else 0.0 * mu)
 
 
+def _makes_stale_friction() -> Callable[..., Floats]:
+    """Returns a resolver that knows an impact by all but μ."""
+    known: dict[Any, Floats] = {}
+
+    def stale(M: Floats, J: Floats, T: Floats, v: Floats, e: float, mu: Floats) -> Floats:
+        key = *(array.tobytes() for array in (M, J, T, v)), e
+        if key not in known:
+            known[key] = moreau(M, J, T, v, e, mu)
+        return known[key]
+
+    return stale
+
+
 # contract and name -> the law that must detect it, and the resolver
 PUSHING: dict[tuple[str, str], tuple[str, Callable[..., Any]]] = {
     ("unilateral", "wrong sign"): (
@@ -206,4 +219,5 @@ PUSHING: dict[tuple[str, str], tuple[str, Callable[..., Any]]] = {
     ("frictional", "strikes what separates"): ("separating", _strikes_what_separates),
     ("frictional", "weak friction"): ("maximal_dissipation", _weak_friction),
     ("frictional", "friction of one alone"): ("maximal_dissipation", friction_of_one_alone),
+    ("frictional", "stale friction"): ("new_friction", _makes_stale_friction()),
 }
