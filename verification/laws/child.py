@@ -7,6 +7,7 @@ kernel's alarm ends a worker whose call takes too long, compiled code that never
 
 from __future__ import annotations
 
+import faulthandler
 import mmap
 import os
 import pickle
@@ -111,6 +112,7 @@ class _Keeper:
 
     def keep(self) -> None:
         """Fork a worker whenever the last one has ended."""
+        faulthandler.disable()  # a crash is told by the keeper
         for number in (signal.SIGINT, signal.SIGALRM, signal.SIGTERM):
             signal.signal(number, signal.SIG_DFL)
         silent = os.open(os.devnull, os.O_WRONLY)

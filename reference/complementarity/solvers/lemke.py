@@ -2,8 +2,8 @@
 b) = 0.
 
 Source: Lemke, Management Science 11 (1965); Cottle, Pang, Stone, Linear Complementarity (1992),
-4.4. With a semidefinite, degenerate W, rounding can end a solvable problem on a ray; a W that is
-larger by 1e-13 on its diagonal is tried then.
+4.4. With a semidefinite, degenerate W, rounding can end a solvable problem on a ray; proximal
+points then solve it with a W that is larger on its diagonal.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ from reference.complementarity.problem import ImpactProblem
 from reference.complementarity.solution import Answer, velocity_scale
 from reference.complementarity.solvers import import_alone
 
-_SOFTER = 1e-13  # added to the diagonal of a unit W
+_SOFTER, _ROUNDS = 1e-12, 5  # added to the diagonal of a unit W: proximal points
+_APART = 1e-14  # added to a unit b, so that opposed contacts do not tie
 _STATUS = {0: "solution found", 1: "iteration limit", 2: "ray termination"}
 
 
@@ -33,9 +34,12 @@ def solve(problem: ImpactProblem) -> Answer:
         float(np.abs(problem.delassus).max(initial=0.0)) or 1.0,
         velocity_scale(problem),
     )
-    result = lcp_lemke(problem.delassus / inertia, problem.offset / speed)
+    w, b = problem.delassus / inertia, problem.offset / speed
+    result = lcp_lemke(w, b)
     if not result.success:  # a W without zero eigenvalues has no rays
-        softer = problem.delassus / inertia + _SOFTER * np.eye(problem.size)
-        result = lcp_lemke(softer, problem.offset / speed)
+        p = np.zeros(problem.size)
+        for _ in range(_ROUNDS):
+            result = lcp_lemke(w + _SOFTER * np.eye(problem.size), b + _APART - _SOFTER * p)
+            p = result.z
     note = f"{_STATUS.get(result.status, result.status)} after {result.num_iter} pivots"
     return Answer(result.z * speed / inertia if result.success else None, note)
