@@ -2,8 +2,8 @@
 b) = 0.
 
 Source: Lemke, Management Science 11 (1965); Cottle, Pang, Stone, Linear Complementarity (1992),
-4.4. With a semidefinite, degenerate W, rounding can end a solvable problem on a ray; proximal
-points then solve it with a W that is larger on its diagonal.
+4.4. With a semidefinite, degenerate W, rounding can end a solvable problem on a ray; a W that
+is larger on its diagonal then gives the active set.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from reference.complementarity.problem import ImpactProblem
 from reference.complementarity.solution import Answer, velocity_scale
 from reference.complementarity.solvers import import_alone
 
-_SOFTER, _ROUNDS = 1e-12, 5  # added to the diagonal of a unit W: proximal points
+_SOFTER = 1e-12  # added to the diagonal of a unit W
 _APART = 1e-14  # added to a unit b, so that opposed contacts do not tie
 _STATUS = {0: "solution found", 1: "iteration limit", 2: "ray termination"}
 
@@ -37,9 +37,9 @@ def solve(problem: ImpactProblem) -> Answer:
     w, b = problem.delassus / inertia, problem.offset / speed
     result = lcp_lemke(w, b)
     if not result.success:  # a W without zero eigenvalues has no rays
-        p = np.zeros(problem.size)
-        for _ in range(_ROUNDS):
-            result = lcp_lemke(w + _SOFTER * np.eye(problem.size), b + _APART - _SOFTER * p)
-            p = result.z
+        result = lcp_lemke(w + _SOFTER * np.eye(problem.size), b + _APART)
+        push = np.flatnonzero(result.z > 0.0)
+        left = -b[push] - w[push] @ result.z
+        result.z[push] += np.linalg.lstsq(w[np.ix_(push, push)], left, rcond=_SOFTER)[0]
     note = f"{_STATUS.get(result.status, result.status)} after {result.num_iter} pivots"
     return Answer(result.z * speed / inertia if result.success else None, note)

@@ -21,6 +21,9 @@ from reference.complementarity.solution import Answer, velocity_scale
 
 _INEQUALITY = 0  # daqp's `sense` of a row
 _ACTIVE_SET = 1e-13  # accuracy for unit rows and unit velocities: a few hundred roundings
+_OPPOSED = (
+    1e-11  # accuracy where rounding makes opposed, nearly parallel rows contradict each other
+)
 _INFINITE = 1e30  # daqp's value for an absent bound
 # accuracy requested for a problem scaled to unit W and b; the reached accuracy is measured
 _PROXQP = 1e-10
@@ -56,16 +59,19 @@ def daqp(rows: Floats, offset: Floats) -> Floats:
     scale = float(np.abs(offset / unit).max(initial=0.0)) or 1.0
     upper, lower = np.full(n, _INFINITE), -offset / unit / scale
     sense = np.full(n, _INEQUALITY, dtype=np.int32)
-    _, _, flag, detail = daqp.solve(
-        np.eye(d),
-        np.zeros(d),
-        np.ascontiguousarray(rows / unit[:, None]),
-        upper,
-        lower,
-        sense,
-        primal_tol=_ACTIVE_SET,
-        dual_tol=_ACTIVE_SET,
-    )
+    for accuracy in (_ACTIVE_SET, _OPPOSED):
+        _, _, flag, detail = daqp.solve(
+            np.eye(d),
+            np.zeros(d),
+            np.ascontiguousarray(rows / unit[:, None]),
+            upper,
+            lower,
+            sense,
+            primal_tol=accuracy,
+            dual_tol=accuracy,
+        )
+        if flag >= 1:
+            break
     if flag < 1:
         raise SolverError(f"daqp: exit flag {flag}" + (", infeasible" if flag == -1 else ""))
     return -np.asarray(detail["lam"]) * scale / unit
