@@ -1,5 +1,6 @@
 """What may not change a motion: the order and names of bodies and walls, a turn, a mirror, the place,
-the unit of length, a wall given twice or in two parts, a far body.
+the unit of length, a wall given twice or in two parts, a far body, the plane given as a part of
+space; and half the step, which may change it by what one step does.
 
 Each ordinary scene of free bodies is run once as it is and once changed. The change is undone on the
 final poses, and the largest difference is a share of the size of the motion.
@@ -11,11 +12,13 @@ import copy
 import json
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+from iapb.run import Run
 from iapb.scene import scene_from_text
 from iapb.simulation import simulate
 from tests.ordinary.scenes import CASES, FLOOR
@@ -38,16 +41,27 @@ def is_free(values: Values) -> bool:
 SCENES = [name for name, case in CASES.items() if is_free(case.scene) and name not in UNSTABLE]
 
 
-def ends(values: Values) -> dict[str, np.ndarray]:
-    """Return the final place of each body by its name, and its sine and cosine or quaternion."""
+def run_of(values: Values) -> Run:
     values = values | {"duration": min(values["duration"], SHORT)}
     run = simulate(scene_from_text(json.dumps(values)))
     assert run.complete
+    return run
+
+
+def ends(run: Run) -> dict[str, np.ndarray]:
+    """Return the final place of each body by its name: three coordinates and the entries of its
+    rotation. The plane is z = 0."""
     found = {}
     for name, pose in zip(run.body_names, run.pose[-1], strict=True):
-        turned = [math.cos(pose[2]), math.sin(pose[2])] if len(pose) == 3 else pose[3:]
-        found[name] = np.array([*pose[: 2 if len(pose) == 3 else 3], *turned])
+        flat = len(pose) == 3
+        at = [*pose[:2], 0.0] if flat else pose[:3]
+        turned = turn_about([0, 0, 1], pose[2]) if flat else Rotation.from_quat(pose[3:])
+        found[name] = np.array([*at, *turned.as_matrix().ravel()])
     return found
+
+
+def turn_about(axis: Any, angle: float) -> Rotation:
+    return Rotation.from_rotvec(angle * np.asarray(axis, float))
 
 
 def size_of(values: Values) -> float:
@@ -60,64 +74,126 @@ def size_of(values: Values) -> float:
     )
 
 
-def placed(values: Values, scale: float, shift: np.ndarray, turn: np.ndarray) -> Values:
-    """Return a scene in another unit of length, at another place, turned or mirrored in the plane."""
+class Place(NamedTuple):
+    """Where and how a scene is placed: its unit, a shift, a turn (about z in the plane, about a
+    tilted axis in space), and whether x is mirrored in the world and in each body."""
+
+    scale: float = 1.0
+    shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    angle: float = 0.0
+    mirrored: bool = False
+
+    def turn(self, space: bool) -> np.ndarray:
+        axis = np.array([1.0, 2.0, 2.0]) / 3.0 if space else np.array([0.0, 0.0, 1.0])
+        return turn_about(axis, self.angle).as_matrix() @ self.flip
+
+    @property
+    def flip(self) -> np.ndarray:
+        """What the mirror does to the axes of a body."""
+        return np.diag([-1.0 if self.mirrored else 1.0, 1.0, 1.0])
+
+
+def placed(values: Values, place: Place) -> Values:
+    """Return the scene at a place."""
     made = copy.deepcopy(values)
     space = made.get("dimensions") == 3
-    mirrored = np.linalg.det(turn) < 0.0
-    sign, angle = (-1.0, 0.0) if mirrored else (1.0, math.atan2(turn[1, 0], turn[0, 0]))
+    axes = 3 if space else 2
+    scale, sign = place.scale, -1.0 if place.mirrored else 1.0
+    turn, flip = place.turn(space), place.flip[:axes, :axes]
 
     def vector(x: Any, length: float = scale) -> np.ndarray:
-        return length * (np.asarray(x, float) if space else turn @ np.asarray(x, float))
+        return length * (turn[:axes, :axes] @ np.asarray(x, float))
 
-    def shaped(shape: Values) -> None:
-        for key in ("radius", "size"):
-            if key in shape:
-                shape[key] = (scale * np.asarray(shape[key])).tolist()
-        for key in ("vertices", "center"):
-            if key in shape:  # in the axes of the body, of which the mirror turns x round
-                points = scale * np.asarray(shape[key], float) * ([-1.0, 1.0] if mirrored else 1.0)
-                shape[key] = points[:: -1 if mirrored and key == "vertices" else 1].tolist()
-        if mirrored and "angle" in shape:
-            shape["angle"] *= -1.0
+    def moved(x: Any) -> list[float]:
+        return (vector(x) + place.shift[:axes]).tolist()
+
+    def turned(rotation: Rotation) -> Rotation:
+        return Rotation.from_matrix(turn @ rotation.as_matrix() @ place.flip)
 
     for body in made["bodies"]:
-        axes = 3 if space else 2
-        body["position"][:axes] = (vector(body["position"][:axes]) + shift[:axes]).tolist()
-        velocity = body.get("velocity") or [0.0] * (2 * axes if space else 3)
-        body["velocity"] = [*vector(velocity[:axes]), *velocity[axes:]]
-        if not space:
-            body["position"][2] = sign * body["position"][2] + angle
-            body["velocity"][2] *= sign
+        velocity = np.array(body.get("velocity") or [0.0] * (2 * axes if space else 3))
+        linear, angular = velocity[:axes], velocity[axes:]
+        body["position"][:axes] = moved(body["position"][:axes])
+        if space:  # the velocity is in the axes of the body; an angular one has an axis
+            body["position"][3:] = (
+                turned(Rotation.from_quat(body["position"][3:])).as_quat().tolist()
+            )
+            body["velocity"] = [*(scale * flip @ linear), *(sign * flip @ angular)]
+        else:
+            body["position"][2] = sign * body["position"][2] + place.angle
+            body["velocity"] = [*vector(linear), *(sign * angular)]
         if "density" in body:
             body["density"] /= scale**axes
         if "inertia" in body:
             body["inertia"] = (scale**2 * np.asarray(body["inertia"])).tolist()
         if "center_of_mass" in body:
-            body["center_of_mass"] = [scale * x for x in body["center_of_mass"]]
+            body["center_of_mass"] = (scale * flip @ body["center_of_mass"]).tolist()
         for shape in body["shapes"]:
-            shaped(shape)
+            for key in ("radius", "size"):
+                if key in shape:
+                    shape[key] = (scale * np.asarray(shape[key])).tolist()
+            for key in ("vertices", "center"):
+                if key in shape:
+                    shape[key] = (scale * np.asarray(shape[key], float) @ flip).tolist()
+            assert not {"angle", "rpy"} & shape.keys()
     for wall in made.get("walls", []):
         for key in ("point", "center"):
             if key in wall:
-                wall[key] = (vector(wall[key]) + shift[: 3 if space else 2]).tolist()
+                wall[key] = moved(wall[key])
         if "normal" in wall:
             wall["normal"] = vector(wall["normal"], 1.0).tolist()
-        if wall["kind"] == "box" and not space:
-            wall["angle"] = sign * wall.get("angle", 0.0) + angle
         if "size" in wall:
             wall["size"] = [scale * x for x in wall["size"]]
+        if wall["kind"] == "box" and space:
+            given = Rotation.from_euler("xyz", wall.get("rpy", [0.0, 0.0, 0.0]))
+            wall["rpy"] = turned(given).as_euler("xyz").tolist()
+        elif wall["kind"] == "box":
+            wall["angle"] = sign * wall.get("angle", 0.0) + place.angle
     if made.get("gravity"):
         made["gravity"] = vector(made["gravity"]).tolist()
     return made
 
 
-PLANE = np.eye(2)
-QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
-ODD = np.array([[math.cos(0.7), -math.sin(0.7)], [math.sin(0.7), math.cos(0.7)]])
-MIRROR = np.diag([-1.0, 1.0])
-HERE = np.zeros(3)
-FAR = np.array([1000.0, 1000.0, 0.0])
+def undone(end: np.ndarray, place: Place, space: bool) -> np.ndarray:
+    """Undo `placed` on a pose of `ends`."""
+    turn = place.turn(space)
+    at = turn.T @ (end[:3] - place.shift) / place.scale
+    return np.array([*at, *(turn.T @ end[3:].reshape(3, 3) @ place.flip).ravel()])
+
+
+def in_space(values: Values) -> Values:
+    """The plane as z = 0 in space: discs are balls, and boxes are as deep as the largest shape."""
+    deep = size_of(values)
+    made = copy.deepcopy(values) | {"dimensions": 3}
+    for body in made["bodies"]:
+        x, y, angle = body["position"]
+        vx, vy, spin = body.get("velocity") or [0.0, 0.0, 0.0]
+        turn = turn_about([0, 0, 1], angle)
+        body["joint"] = "free_flyer"
+        body["position"] = [x, y, 0.0, *turn.as_quat().tolist()]
+        body["velocity"] = [*turn.inv().apply([vx, vy, 0.0]).tolist(), 0.0, 0.0, spin]
+        body["inertia"] = [body["inertia"]] * 3
+        for shape in body["shapes"]:
+            if shape["kind"] == "circle":
+                shape["kind"] = "sphere"
+            deepened(shape, deep)
+    for wall in made.get("walls", []):
+        if wall["kind"] == "half_plane":
+            wall["kind"] = "half_space"
+        deepened(wall, 4.0 * deep)
+        if "angle" in wall:
+            wall["rpy"] = [0.0, 0.0, wall.pop("angle")]
+    if made.get("gravity"):
+        made["gravity"] = [*made["gravity"], 0.0]
+    return made
+
+
+def deepened(part: Values, deep: float) -> None:
+    for key in ("point", "center", "normal"):
+        if key in part:
+            part[key] = [*part[key], 0.0]
+    if "size" in part:
+        part["size"] = [*part["size"], deep]
 
 
 def reordered(values: Values) -> Values:
@@ -164,22 +240,16 @@ def beside(mass: float) -> Callable[[Values], Values]:
     return change
 
 
-def undone(end: np.ndarray, scale: float, shift: np.ndarray, turn: np.ndarray) -> np.ndarray:
-    """Undo `placed` on a pose of `ends`."""
-    if len(end) > 4:
-        return np.array([*((end[:3] - shift) / scale), *end[3:]])
-    mirrored = np.linalg.det(turn) < 0.0
-    c, s = end[2:]
-    back = [c, -s] if mirrored else turn.T @ [c, s]
-    return np.array([*(turn.T @ (end[:2] - shift[:2]) / scale), *back])
+def as_it_is(values: Values) -> Values:
+    return values
 
 
-Place = tuple[float, np.ndarray, np.ndarray]
-SAME: Place = (1.0, HERE, PLANE)
+SAME = Place()
 # name: change, its place, and the largest difference in shares of the size. Sums in another order
 # differ by rounding, 1e-16 of the size. Limits of friction are settled to 1e-3 of themselves, from
 # a start that the last step gives, so a rounding can move a slip by that share of a step's: 1e-6.
-# Two walls at one place share such a limit, and each half settles by itself: 1e-4.
+# Two walls at one place share such a limit, and each half settles by itself: 1e-4. So do the two
+# corners in space that are one in the plane.
 # A kilometre rounds positions to 1e-13 m, and touch itself by as much.
 CHANGES: dict[str, tuple[Callable[[Values], Values], Place, float]] = {
     "reordered and renamed": (reordered, SAME, 1e-6),
@@ -187,32 +257,46 @@ CHANGES: dict[str, tuple[Callable[[Values], Values], Place, float]] = {
     "floor in two": (in_two, SAME, 1e-6),
     "a light body far away": (beside(1e-3), SAME, 0.0),
     "a heavy body far away": (beside(1e6), SAME, 0.0),
-    "turned by a right angle": (lambda x: x, (1.0, HERE, QUARTER), 1e-6),
-    "turned by 0.7": (lambda x: x, (1.0, HERE, ODD), 1e-6),
-    "mirrored": (lambda x: x, (1.0, HERE, MIRROR), 1e-6),
-    "a kilometre away": (lambda x: x, (1.0, FAR, PLANE), 1e-4),
-    "in millimetres": (lambda x: x, (1000.0, HERE, PLANE), 1e-4),
+    "turned by a right angle": (as_it_is, Place(angle=math.pi / 2.0), 1e-6),
+    "turned by 0.7": (as_it_is, Place(angle=0.7), 1e-6),
+    "mirrored": (as_it_is, Place(mirrored=True), 1e-6),
+    "a kilometre away": (as_it_is, Place(shift=(1000.0, 1000.0, 0.0)), 1e-4),
+    "in millimetres": (as_it_is, Place(scale=1000.0), 1e-4),
+    "in space": (in_space, SAME, 1e-4),
 }
 
 
 @pytest.fixture(scope="module")
-def plain() -> dict[str, dict[str, np.ndarray]]:
+def plain() -> dict[str, Run]:
     return {}
 
 
 def means_something(name: str, change: str) -> bool:
-    """Whether a change can be made: turns and mirrors are of the plane, blocks replace its floor,
-    and numbers of a scene are at most 1e9."""
-    values, (how, place, _) = CASES[name].scene, CHANGES[change]
-    if values.get("dimensions") == 3:
-        return how is not in_two and place[2] is PLANE
-    whole = how is not in_two or FLOOR in values.get("walls", [])
-    return whole and (name, change) != ("heavy_box_rests", "in millimetres")
+    """Whether a change can be made: blocks replace the floor of a plane, space has no polygons, and
+    numbers of a scene are at most 1e9."""
+    values, (how, _, _) = CASES[name].scene, CHANGES[change]
+    space = values.get("dimensions") == 3
+    if how is in_two:
+        return not space and FLOOR in values.get("walls", [])
+    if how is in_space:
+        shapes = [shape for body in values["bodies"] for shape in body["shapes"]]
+        return not space and all(shape["kind"] != "polygon" for shape in shapes)
+    return (name, change) != ("heavy_box_rests", "in millimetres")
 
 
-# every pair of a scene and a change; one of six by default
+def difference(plain: Run, changed: Run, values: Values, place: Place = SAME) -> float:
+    """Return the largest difference of a final pose in shares of the size of the motion."""
+    found, size, shares = ends(changed), size_of(values), [0.0]
+    for body, expected in ends(plain).items():
+        back = undone(found[body], place, values.get("dimensions") == 3)
+        moved = max(size, float(np.abs(expected[:3]).max()))
+        shares.append(float(np.abs(back - expected).max()) / moved)
+    return max(shares)
+
+
+# every pair of a scene and a change; two scenes of each change by default
 PAIRS = [
-    pytest.param(name, change, marks=[] if (i + k) % 6 == 0 else pytest.mark.thorough)
+    pytest.param(name, change, marks=[] if (i + 7 * k) % 32 == 0 else pytest.mark.thorough)
     for i, name in enumerate(SCENES)
     for k, change in enumerate(CHANGES)
     if means_something(name, change)
@@ -221,14 +305,39 @@ PAIRS = [
 
 @pytest.mark.parametrize(("name", "change"), PAIRS)
 def test_a_change_that_means_nothing_changes_nothing(
-    name: str, change: str, plain: dict[str, dict[str, np.ndarray]]
+    name: str, change: str, plain: dict[str, Run]
 ) -> None:
     values = CASES[name].scene
     how, place, most = CHANGES[change]
     if name not in plain:
-        plain[name] = ends(values)
-    found, size = ends(placed(how(values), *place)), size_of(values)
-    for body, expected in plain[name].items():
-        difference = np.abs(undone(found[body], *place) - expected)
-        moved = max(size, float(np.abs(expected[: -2 if len(expected) == 4 else 3]).max()))
-        assert difference.max() / moved <= most, body
+        plain[name] = run_of(values)
+    changed = run_of(placed(how(values), place))
+    assert difference(plain[name], changed, values, place) <= most
+
+
+def way_of(run: Run, values: Values) -> float:
+    """Return the way of the fastest point in one step [m], with what gravity adds in it."""
+    axes = 3 if values.get("dimensions") == 3 else 2
+    speeds = run.v.reshape(len(run.v), -1, 6 if axes == 3 else 3)
+    linear, angular = (np.linalg.norm(part, axis=2) for part in np.split(speeds, [axes], axis=2))
+    fastest = float((linear + size_of(values) * angular).max())
+    return (fastest + float(np.linalg.norm(values.get("gravity", 0.0))) * run.dt) * run.dt
+
+
+LATE = 4.0
+GROWTH = {"box_tips_over_edge": 9.0}  # of an error while the box passes its upright pose
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("name", SCENES)
+def test_half_the_step_changes_a_motion_by_what_a_step_may(
+    name: str, plain: dict[str, Run]
+) -> None:
+    """A method of order one: it finds a touch up to a step late, so the body is a step's way too far,
+    and leaves with up to twice its speed; friction stops it as late. So four ways of a step."""
+    values = CASES[name].scene
+    if name not in plain:
+        plain[name] = run_of(values)
+    finer = run_of(values | {"rate": 2.0 * values["rate"]})
+    most = LATE * GROWTH.get(name, 1.0) * way_of(plain[name], values) / size_of(values)
+    assert difference(plain[name], finer, values) <= most
