@@ -18,7 +18,7 @@ from iapb.contact.kernels.impact_friction import FrictionWork
 from iapb.contact.kernels.implicit import RestWork
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.step import STATUS_TEXT, TOO_MANY_CONTACTS
-from iapb.contact.kernels.unilateral import PushWork
+from iapb.contact.kernels.unilateral import PushWork, ShareWork
 from iapb.contact.kernels.world import State, Switches, World
 from iapb.contact.laws import ImpulseAugmented
 from iapb.errors import ArgumentError, IapbError
@@ -209,6 +209,7 @@ class System:
             scene.largest_friction > 0.0 and not per_body
         )  # per-body rows have no slip: no friction in impacts
         soft = contact.forces == "implicit" or bool(self.joint_friction.any())
+        uneven = len(self.restitutions) > 1
         log = blank(IMPACTS[1:], {"impact": trees, "velocity": d})
         for name, value in {
             "scale": 1,
@@ -229,6 +230,7 @@ class System:
             scratch_contacts=zeros_of(ContactBuffer, contact=c),
             work=zeros_of(ImpactWork, velocity=d, row=rows),
             push_work=zeros_of(PushWork, velocity=d, row=rows),
+            share_work=zeros_of(ShareWork, velocity=(rows + 1) * uneven, row=rows * uneven),
             friction_work=zeros_of(
                 FrictionWork,
                 velocity=d * sliding,

@@ -25,6 +25,7 @@ from iapb.contact.kernels.resolve import (
     Results,
     resolve_each,
 )
+from iapb.contact.kernels.unilateral import ShareWork
 from iapb.errors import ArgumentError, IapbError, RangeError, SolverError
 from iapb.linalg import cholesky
 from iapb.names import one_of
@@ -37,7 +38,14 @@ NEWTON, POISSON, COULOMB = (
     "Poisson, two LCPs",
     "Newton, equality, with Coulomb friction",
 )
-_STATUS = "complete", "budget", "cancelled", "reduced", "not solved"  # the kernel's codes
+_STATUS = (
+    "complete",
+    "budget",
+    "cancelled",
+    "reduced",
+    "not solved",
+    "scaled",
+)  # codes of the kernel
 _resolve_each = Entry(resolve_each)
 _ONE = "mass_matrix", "contact_jacobian", "velocity"
 _MANY = "mass_matrices", "contact_jacobians", "velocities"
@@ -70,8 +78,10 @@ class Impact(NamedTuple):
         rise in this case either); ``"reduced"``: no p_t that obeys Coulomb's law was found (there may be
         none). p_t then maximizes the dissipation within the friction limits of the frictionless
         impact. It stays in the friction cones, and passivity and restitution still hold.
-        ``"cancelled"``: no change of velocity without an energy gain was found, so v⁺ = v⁻, or the
-        entries of v differ by more than 2^1000 in size, so that scaling rounded the smallest.
+        ``"scaled"``: Coulomb's law would add energy, and `friction_share` scales p_t down until the
+        impact does not. ``"cancelled"``: no change of velocity without an energy gain was found, so
+        v⁺ = v⁻, or an entry of v that takes part is so much smaller than the largest, by 2^1000,
+        that scaling rounded it.
     method, law : the method that computed the impact, and its impact law.
     rows_used : the row budget used (None = unlimited); the same budget reproduces the result
         exactly.
@@ -126,7 +136,9 @@ def resolve_impact(
     velocity : (d,) generalized velocity v⁻ before the impact [m/s, rad/s].
     restitution : e in [−1, 1] for all contacts; or (c,) values in [0, 1], one per contact. Unequal
         values use Poisson's law by two LCPs (compression, then restitution; contacts only push),
-        which is passive for any such values. Equal values use the scalar rule.
+        which is passive for any such values. Where rows are redundant, the least impulses of
+        compression count (`share_compression`), so their order, scale and copies do not matter.
+        Equal values use the scalar rule.
     method : ``factored`` (default), every row an equality; or ``poisson``, contacts only push, e in
         [0, 1]. It equals Newton's LCP if every row approaches and e is one number.
     budget : largest number of rows used, the most violated first (``factored`` only). Every budget
@@ -355,6 +367,7 @@ def make_batch(n: int, c: int, d: int, directions: int = 0, unequal: bool = Fals
             work=zeros_of(
                 ResolveWork, velocity=d, row=rows, tangent=rows * directions, direction=directions
             ),
+            share=zeros_of(ShareWork, velocity=(rows + 1) * unequal, row=rows * unequal),
             out=Results(
                 np.empty((n, d)),
                 np.empty((n, d)),

@@ -281,6 +281,7 @@ def restitution_per_contact() -> Finding:
         "unequal_kinetic_energy",
         impacts=COUNTER_IMPACTS // 2,
         unequal_restitution=True,
+        laws=["unequal_kinetic_energy"],
     )
     gain = relative_gain(case.mass_matrix, case.velocity, given["v⁺ as computed"])
     sentence = (

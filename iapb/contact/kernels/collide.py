@@ -139,7 +139,15 @@ def resolve_unequal(world, state, size, count, smallest, tolerance):
     which is passive."""
     work = state.work
     rank, clamp = poisson_impact(
-        size, count, state.row_restitution, True, work, state.push_work, state.row_impulse
+        size,
+        count,
+        state.row_restitution,
+        tolerance,
+        True,
+        work,
+        state.push_work,
+        state.share_work,
+        state.row_impulse,
     )
     solved = rank >= 0
     if not solved:
@@ -262,7 +270,7 @@ def resolve_rows(world, state, size, count):
             own = pair_restitution(world, contacts, i)
             state.row_restitution[r], e, largest = own, min(e, own), max(largest, own)
         unequal = unequal or e < largest
-    whiten_impact(size, count, work)
+    whiten_impact(size, count, unequal or world.switches.impact_friction, work)
     if (
         unequal
         and world.switches.implicit_contact

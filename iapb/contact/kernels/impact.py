@@ -19,7 +19,7 @@ from iapb.linalg import (
     to_whitened,
     whiten_columns,
 )
-from iapb.schema import Floats
+from iapb.schema import Booleans, Floats
 
 # Two rows that differ by less than this (rows of unit length in the kinetic metric) count as one.
 # The error of restitution is then at most (1 + e) · tolerance · |u|. A larger tolerance would
@@ -39,6 +39,8 @@ class ImpactWork(NamedTuple):
 
     mass: Annotated[Floats, "velocity velocity"]  # M, symmetric to rounding
     lower: Annotated[Floats, "velocity velocity"]  # the Cholesky factor of its symmetric part
+    correction: Annotated[Floats, "velocity velocity"]  # C with M = L C Cᵀ Lᵀ, where `corrected`
+    corrected: Annotated[Booleans, "1"]
     v: Annotated[Floats, "velocity"]  # v⁻
     v_plus: Annotated[Floats, "velocity"]
     momentum: Annotated[Floats, "velocity"]  # generalized impulse M(v⁺ − v⁻)
@@ -74,15 +76,21 @@ def rank_tolerance(lower):
 
 
 @kernel
-def whiten_impact(d, count, work):
+def whiten_impact(d, count, exact, work):
     """Prepare an impact from v and `count` rows of J in `work.columns`: write u, unit rows of A,
     and their lengths.
 
     The unit rows go to `work.rows` and, in place of those of J, to `work.columns`.
+    exact : whether to whiten by L C (`correct_factor`) where L alone is felt; else `refine_change`
+        corrects the result.
     """
-    columns, length = work.columns, work.length
-    to_whitened(work.lower, work.v[:d], work.u)
+    columns, length, u = work.columns, work.length, work.u[:d]
+    to_whitened(work.lower, work.v[:d], u)
     whiten_columns(work.lower[:d, :d], columns, count)
+    work.corrected[0] = exact and correct_factor(d, work)
+    if work.corrected[0]:
+        to_whitened(work.correction, u, u)
+        whiten_columns(work.correction[:d, :d], columns, count)
     length[:count] = 0.0
     for k in range(d):
         for i in range(count):
@@ -112,10 +120,20 @@ def factored_impact(d, count, restitution, tolerance, budget, clamped, work):
     change[:] = 0.0
     for j in range(rank):
         add_multiple(change, -((1.0 + restitution) * dot_of(work.basis[j], u)), work.basis[j])
-    from_whitened(work.lower, change, work.v_change)
-    if clamped:
+    write_change(d, work)
+    if clamped and not work.corrected[0]:
         refine_change(d, rank, work)
     return rank, apply_change(d, clamped, work)
+
+
+@kernel
+def write_change(d, work):
+    """Write Δv = work.v_change of Δu = work.change."""
+    step = work.v_change[:d]
+    copy_into(step, work.change[:d])
+    if work.corrected[0]:
+        from_whitened(work.correction, step, step)
+    from_whitened(work.lower, step, step)
 
 
 @kernel
@@ -133,7 +151,10 @@ def apply_change(d, clamped, work):
         write_step(v, v_change, alpha, v_plus)
     for k in range(d):
         work.change[k] *= alpha
-    to_momentum(work.lower, work.change[:d], work.momentum)
+        work.shifted[k] = work.change[k]
+    if work.corrected[0]:
+        to_momentum(work.correction, work.change[:d], work.shifted)
+    to_momentum(work.lower, work.shifted[:d], work.momentum)
     return alpha
 
 
@@ -155,7 +176,7 @@ def factored_impacts(
                 copy_into(work.columns[i], columns[m, i])
                 work.v[i] = work.v_plus[i] = velocities[m, i]
             if cholesky(work.mass, work.lower) == 0:
-                whiten_impact(d, c, work)
+                whiten_impact(d, c, False, work)
                 least = rank_tolerance(work.lower)
                 _, clamps[m] = factored_impact(d, c, restitution[m], least, budget, clamped, work)
         copy_into(v_plus[m], work.v_plus)
@@ -169,6 +190,34 @@ _FELT = 1e-12
 # passivity
 _CONTRACTS = 0.1
 _PASSES = 3  # each multiplies the remaining error by |E|, about d ε κ(M): 1e-3 at κ(M) = 1e12
+
+
+@kernel
+def correct_factor(d, work):
+    """Write C with M = L C Cᵀ Lᵀ to `work.correction`; return whether it is felt: else it is as
+    good as I.
+
+    C is the Cholesky factor of I + E, E = L⁻¹ (M − L Lᵀ) L⁻ᵀ with the residual in double-double.
+    All that follows then sees M itself: LCPs and friction, whose limits depend on it, too.
+    """
+    lower, correction, felt = work.lower[:d, :d], work.correction[:d, :d], 0.0
+    for i in range(d):
+        for j in range(i + 1):
+            high, low = symmetric_entry(work.mass, i, j)
+            for k in range(j + 1):
+                if lower[i, k] != 0.0:
+                    high, low = add_product(high, low, -lower[i, k], 0.0, lower[j, k])
+            correction[i, j] = correction[j, i] = high + low
+    for _ in range(2):
+        whiten_columns(lower, correction, d)
+        for i in range(d):
+            for j in range(i):
+                correction[i, j], correction[j, i] = correction[j, i], correction[i, j]
+    for i in range(d):
+        for j in range(d):
+            felt = max(felt, abs(correction[i, j]))
+        correction[i, i] += 1.0
+    return felt > _FELT and cholesky(correction, correction) == 0
 
 
 @kernel

@@ -22,11 +22,11 @@ import math
 from typing import Annotated, NamedTuple
 
 from iapb.compiled import copy_into, kernel
-from iapb.contact.kernels.impact import apply_change
+from iapb.contact.kernels.impact import apply_change, write_change
 from iapb.contact.kernels.row_basis import add_minimum_norm, minimum_norm_factors
 from iapb.contact.kernels.unilateral import push_only
 from iapb.elementary import hypotenuse
-from iapb.linalg import add_multiple, dot_of, from_whitened, orthogonalize
+from iapb.linalg import add_multiple, dot_of, orthogonalize
 from iapb.schema import Floats
 
 # share of a tangent's row: a smaller part outside the span of the normal rows is rounding
@@ -79,12 +79,12 @@ def add_impact_friction(d, count, rank, work, push, f, only_push, impulses):
         work.change[:d],
         f.moved[:d],
     )
-    lower, largest = work.lower, 0.0
+    largest = 0.0
     for j in range(
         p.shape[0]
     ):  # whiten the tangents' rows, and remove the span of the normal rows: B and A_t Qᵀ
         row, slip = f.rows[j, :d], 0.0
-        whiten_row(lower, row)
+        whiten_row(row, work)
         for k in range(d):
             slip += row[k] * (u[k] + change[k])
         f.speed[j], before = slip, dot_of(row, row)
@@ -102,7 +102,7 @@ def add_impact_friction(d, count, rank, work, push, f, only_push, impulses):
     alpha = passive_share(u, change, moved)
     share *= alpha
     add_multiple(change, alpha, moved)
-    from_whitened(lower, change, work.v_change)
+    write_change(d, work)
     clamp = apply_change(d, True, work)
     for i in range(count):
         impulses[i] = clamp * (f.without[i] + share * (f.wanted[i] - f.without[i]))
@@ -112,10 +112,12 @@ def add_impact_friction(d, count, rank, work, push, f, only_push, impulses):
 
 
 @kernel
-def whiten_row(lower, row):
-    """Solve L x = row in place."""
-    for k in range(row.shape[0]):
-        row[k] = (row[k] - dot_of(lower[k], row[:k])) / lower[k, k]
+def whiten_row(row, work):
+    """Solve L x = row in place, or L C x = row (`correct_factor`)."""
+    for turn in range(2 if work.corrected[0] else 1):
+        factor = work.correction if turn else work.lower
+        for k in range(row.shape[0]):
+            row[k] = (row[k] - dot_of(factor[k], row[:k])) / factor[k, k]
 
 
 @kernel
@@ -238,7 +240,7 @@ def sweep_impact(d, count, work, f, impulses):
     """
     size, u, moved, p_n = f.velocity.shape[0], work.u[:d], f.moved[:d], f.wanted
     for j in range(count * size):
-        whiten_row(work.lower, f.rows[j, :d])
+        whiten_row(f.rows[j, :d], work)
         f.speed[j] = dot_of(f.rows[j, :d], u)
     for i in range(count):
         set_inertia(f, i, d)
@@ -267,7 +269,7 @@ def sweep_impact(d, count, work, f, impulses):
     if fastest > SWEPT * speed or dot_of(u, moved) + 0.5 * dot_of(moved, moved) > 0.0:
         return 1.0, False
     copy_into(work.change[:d], moved)
-    from_whitened(work.lower, work.change[:d], work.v_change)
+    write_change(d, work)
     clamp = apply_change(d, True, work)
     for i in range(count):
         impulses[i] = clamp * p_n[i] / work.length[i] if work.length[i] > 0.0 else 0.0

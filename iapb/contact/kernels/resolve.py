@@ -13,11 +13,16 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from iapb.compiled import copy_into, kernel
-from iapb.contact.kernels.impact import ImpactWork, factored_impact, rank_tolerance, whiten_impact
+from iapb.contact.kernels.impact import (
+    ImpactWork,
+    factored_impact,
+    rank_tolerance,
+    whiten_impact,
+)
 from iapb.contact.kernels.impact_friction import FrictionWork, add_impact_friction
 from iapb.contact.kernels.passive import gain_enclosure, passive_step
 from iapb.contact.kernels.row_basis import minimum_norm_impulses
-from iapb.contact.kernels.unilateral import PushWork, poisson_impact
+from iapb.contact.kernels.unilateral import PushWork, ShareWork, poisson_impact
 from iapb.double_double import kinetic_energies
 from iapb.linalg import add_multiple, all_finite, cholesky, dot_of
 from iapb.schema import Floats, Integers
@@ -27,16 +32,21 @@ from iapb.schema import Floats, Integers
 SYMMETRY_TOLERANCE = 1e-9
 LARGEST_ENTRY = 2.0  # of the scaled M: |Mᵢⱼ| < √(Mᵢᵢ Mⱼⱼ) holds where M is positive definite
 _LOWEST_EXPONENT = -100_000  # exponent given to zeros, so that they never decide a maximum
-_EXACT = (
-    1000  # largest difference of binary exponents from the largest entry that still scales exactly
-)
 # Where a contact still closes faster than this share of the largest |J v⁻|, or the energy clamp
 # takes more than this, the two LCPs of Poisson's law were not solved. Rounding leaves 1e-13 √κ(M);
 # rows that push against each other more.
 _UNSOLVED = 1e-6
+_ROUNDED = 1e-14  # share of the terms of a contact velocity: some times their rounding
+
+# Friction below this share of what Coulomb's law asks for is scaled; above, the rest is rounding.
+_WHOLE = 1.0 - 1e-9
+# Largest difference of the binary exponents of rows with friction that are not scaled.
+_EVEN = 20
+# The p of least norm is corrected until it misses less than this share of Δu, or this many times.
+_MISSED, _CORRECTIONS = 1e-12, 4
 
 # How an impact ends; the last two have no result.
-COMPLETE, BUDGET, CANCELLED, REDUCED, NOT_SOLVED, REFUSED, NOT_CONVERGED = range(7)
+COMPLETE, BUDGET, CANCELLED, REDUCED, NOT_SOLVED, SCALED, REFUSED, NOT_CONVERGED = range(8)
 
 
 class Results(NamedTuple):
@@ -76,6 +86,7 @@ class Batch(NamedTuple):
     tangents: np.ndarray  # (n, c m, d) for Coulomb's friction, added to (21), or (0, c m, d)
     friction: np.ndarray  # (n, c) likewise
     work: ResolveWork
+    share: ShareWork  # empty without Poisson's law
     out: Results
 
 
@@ -98,19 +109,21 @@ def resolve_each(batch, tolerance, budget, clamped):
             out.tangential[m],
         )
         out.numbers[m, 1] = REFUSED
-        sound, k, rounded = scale_impact(masses[m], jacobians[m], velocities[m], not rubs, work)
+        sound, k = scale_impact(masses[m], jacobians[m], velocities[m], not rubs, work)
         if not sound:
             return m
-        whiten_impact(d, c, impact)
+        whiten_impact(d, c, rubs or pushes, impact)
         share, status = 1.0, COMPLETE
+        least = tolerance if tolerance > 0.0 else rank_tolerance(impact.lower)
         if pushes:
-            rank, clamp = poisson_impact(d, c, batch.unequal[m], clamped, impact, work.push, p)
+            rank, clamp = poisson_impact(
+                d, c, batch.unequal[m], least, clamped, impact, work.push, batch.share, p
+            )
             if rank < 0:
                 out.numbers[m, 1] = NOT_CONVERGED
                 return m
             status = COMPLETE if clamp >= 1.0 - _UNSOLVED else NOT_SOLVED
         else:
-            least = tolerance if tolerance > 0.0 else rank_tolerance(impact.lower)
             rank, clamp = factored_impact(
                 d, c, batch.restitution[m], least, budget, clamped, impact
             )
@@ -122,16 +135,28 @@ def resolve_each(batch, tolerance, budget, clamped):
                 for j in range(p_t.shape[0]):
                     for i in range(d):
                         f.rows[j, i] = np.ldexp(
-                            batch.tangents[m, j, i], work.coordinate_exponent[i]
+                            batch.tangents[m, j, i],
+                            work.coordinate_exponent[i] + work.row_exponent[j * c // p_t.shape[0]],
                         )
                 copy_into(f.coefficient[:c], batch.friction[m])
                 share, factor, met = add_impact_friction(d, c, rank, impact, work.push, f, False, p)
                 clamp *= factor
-                status = COMPLETE if met else REDUCED
+                status = (COMPLETE if share > _WHOLE else SCALED) if met else REDUCED
                 copy_into(p_t, f.p)
-        clamp *= unscale_impact(
-            masses[m], velocities[m], clamped, k, work, v_plus, momentum, p, p_t, out.numbers[m]
+        factor, rounded = unscale_impact(
+            masses[m],
+            jacobians[m],
+            velocities[m],
+            clamped,
+            k,
+            work,
+            v_plus,
+            momentum,
+            p,
+            p_t,
+            out.numbers[m],
         )
+        clamp *= factor
         if not (
             all_finite(v_plus)
             and all_finite(momentum)
@@ -144,7 +169,7 @@ def resolve_each(batch, tolerance, budget, clamped):
             status = NOT_SOLVED
         out.numbers[m, 0], out.numbers[m, 1] = (
             rank,
-            CANCELLED if clamp == 0.0 or rounded and c > 0 else status,
+            CANCELLED if clamp == 0.0 or rounded else status,
         )
         out.numbers[m, 5], out.numbers[m, 6] = clamp, share
     return n
@@ -152,11 +177,11 @@ def resolve_each(batch, tolerance, budget, clamped):
 
 @kernel
 def scale_impact(mass_matrix, jacobian, velocity, scales_rows, work):
-    """Scale: v' = 2^−(s + k) v, M' = 2^(s + s) M, J' = 2^(s + r) J, with r = 0 if rows are not to
-    be scaled; factor M'.
+    """Scale: v' = 2^−(s + k) v, M' = 2^(s + s) M, J' = 2^(s + r) J; factor M'.
 
-    Returns whether all is finite and M symmetric and positive definite, k, and whether scaling
-    rounded entries of v.
+    Returns whether all is finite and M symmetric and positive definite, and k.
+    scales_rows : False takes r = 0, unless the rows differ in size by more than 2^_EVEN: the
+        normal impulses of friction depend on the scale where they are not unique.
     """
     d, s, r, impact = velocity.shape[0], work.coordinate_exponent, work.row_exponent, work.impact
     for i in range(d):
@@ -165,7 +190,7 @@ def scale_impact(mass_matrix, jacobian, velocity, scales_rows, work):
             and math.isfinite(mass_matrix[i, i])
             and math.isfinite(velocity[i])
         ):
-            return False, 0, False
+            return False, 0
         s[i] = -(math.frexp(mass_matrix[i, i])[1] // 2)
     for i in range(d):
         for j in range(d):
@@ -174,27 +199,31 @@ def scale_impact(mass_matrix, jacobian, velocity, scales_rows, work):
         for j in range(d):
             a, b = impact.mass[i, j], impact.mass[j, i]
             if not (abs(a) <= LARGEST_ENTRY and abs(a - b) <= SYMMETRY_TOLERANCE):
-                return False, 0, False
+                return False, 0
             impact.lower[i, j] = a if a == b else 0.5 * (a + b)
     if cholesky(impact.lower, impact.lower) != 0:
-        return False, 0, False
-    k, rounded = _LOWEST_EXPONENT, False
+        return False, 0
+    k = _LOWEST_EXPONENT
     for i in range(d):
         k = max(k, _exponent(velocity[i]) - s[i])
     k = 0 if k <= _LOWEST_EXPONENT // 2 else k
     for i in range(d):
-        rounded = rounded or _LOWEST_EXPONENT // 2 < _exponent(velocity[i]) - s[i] < k - _EXACT
         impact.v[i] = np.ldexp(velocity[i], -(s[i] + k))
+    longest, shortest = -_LOWEST_EXPONENT, _LOWEST_EXPONENT
     for i in range(jacobian.shape[0]):
-        r[i] = -_LOWEST_EXPONENT if scales_rows else 0  # the first is that of a row of zeros
+        r[i] = -_LOWEST_EXPONENT  # of a row of zeros
         for j in range(d):
             if not math.isfinite(jacobian[i, j]):
-                return False, 0, False
-            if scales_rows:
-                r[i] = min(r[i], -_exponent(jacobian[i, j]) - s[j])
+                return False, 0
+            r[i] = min(r[i], -_exponent(jacobian[i, j]) - s[j])
+        if r[i] < -_LOWEST_EXPONENT // 2:
+            longest, shortest = min(longest, r[i]), max(shortest, r[i])
+    for i in range(jacobian.shape[0]):
+        if not scales_rows and (shortest - longest <= _EVEN or r[i] > shortest):
+            r[i] = 0
         for j in range(d):
             impact.columns[j, i] = np.ldexp(jacobian[i, j], r[i] + s[j])
-    return True, k, rounded
+    return True, k
 
 
 @kernel
@@ -206,14 +235,17 @@ def _exponent(value):
 @kernel
 def separates(jacobian, v, v_plus):
     """Whether no contact closes after Poisson's law, by more than _UNSOLVED of the largest contact
-    velocity before."""
-    largest, least = 0.0, 0.0
+    velocity before, or than the rounding of its own."""
+    largest, separate = 0.0, True
     for i in range(jacobian.shape[0]):
-        largest, least = (
-            max(largest, abs(dot_of(jacobian[i], v))),
-            min(least, dot_of(jacobian[i], v_plus)),
-        )
-    return least >= -_UNSOLVED * largest
+        largest = max(largest, abs(dot_of(jacobian[i], v)))
+    for i in range(jacobian.shape[0]):
+        terms = 0.0
+        for k in range(v.shape[0]):
+            terms += abs(jacobian[i, k] * v_plus[k])
+        closing = -dot_of(jacobian[i], v_plus)
+        separate = separate and closing <= max(_UNSOLVED * largest, _ROUNDED * terms)
+    return separate
 
 
 @kernel
@@ -236,35 +268,55 @@ def least_norm_impulses(d, count, rank, work, impulses):
         return
     for i in range(count):
         impulses[i] *= work.size[i]
-    for k in range(d):
-        total = 0.0
-        for i in range(count):
-            total += impact.rows[k, i] * impact.length[i] * impulses[i]
-        impact.v_change[k] = impact.change[k] - total
-    minimum_norm_impulses(d, count, rank, impact.length, impact.v_change[:d], work.length, impact)
-    add_multiple(impulses, 1.0, work.length)
+    missed, change = impact.v_change[:d], impact.change[:d]
+    for turn in range(_CORRECTIONS):
+        for k in range(d):
+            total = 0.0
+            for i in range(count):
+                total += impact.rows[k, i] * impact.length[i] * impulses[i]
+            missed[k] = change[k] - total
+        if turn > 0 and dot_of(missed, missed) <= _MISSED * _MISSED * dot_of(change, change):
+            break
+        minimum_norm_impulses(d, count, rank, impact.length, missed, work.length, impact)
+        add_multiple(impulses, 1.0, work.length)
 
 
 @kernel
 def unscale_impact(
-    mass_matrix, velocity, clamped, k, work, v_plus, momentum, impulses, tangential, numbers
+    mass_matrix,
+    jacobian,
+    velocity,
+    clamped,
+    k,
+    work,
+    v_plus,
+    momentum,
+    impulses,
+    tangential,
+    numbers,
 ):
     """Return to the caller's units in place; clamp the step again if this rounding raised the
     energy.
 
     Writes the energy change, its lower and upper bound, unless v⁺ overflows; returns the factor of
-    this clamp.
+    this clamp, and whether scaling rounded an entry of v that a row or the impact touches.
     """
     d, s, factor, impact = velocity.shape[0], work.coordinate_exponent, 1.0, work.impact
+    rounded = False
     for i in range(d):
-        v_plus[i] = np.ldexp(impact.v_plus[i], s[i] + k)
+        touched = impact.v_plus[i] != impact.v[i]
+        v_plus[i] = np.ldexp(impact.v_plus[i], s[i] + k) if touched else velocity[i]
+        for m in range(jacobian.shape[0]):
+            touched = touched or jacobian[m, i] != 0.0
+        rounded = rounded or touched and np.ldexp(impact.v[i], s[i] + k) != velocity[i]
         momentum[i] = np.ldexp(impact.momentum[i], k - s[i])
     for i in range(impulses.shape[0]):
         impulses[i] = np.ldexp(impulses[i], work.row_exponent[i] + k)
     for j in range(tangential.shape[0]):
-        tangential[j] = np.ldexp(tangential[j], k)
+        r = work.row_exponent[j * impulses.shape[0] // tangential.shape[0]]
+        tangential[j] = np.ldexp(tangential[j], r + k)
     if not all_finite(v_plus):
-        return factor
+        return factor, rounded
     lower, upper, exponent = gain_enclosure(mass_matrix, velocity, v_plus)
     if clamped and not upper <= 0.0:
         step = impact.v_change
@@ -281,7 +333,7 @@ def unscale_impact(
     low, high = _outward(lower, exponent - 2, -math.inf), _outward(upper, exponent - 2, math.inf)
     change = low if low > change else change
     numbers[2], numbers[3], numbers[4] = high if high < change else change, low, high
-    return factor
+    return factor, rounded
 
 
 @kernel

@@ -12,13 +12,21 @@ import math
 from typing import Annotated, NamedTuple
 
 from iapb.compiled import copy_into, kernel
-from iapb.contact.kernels.impact import apply_change
-from iapb.linalg import dot_of, from_whitened, orthogonalize
+from iapb.contact.kernels.impact import apply_change, write_change
+from iapb.contact.kernels.row_basis import minimum_norm_factors, orthonormal_basis
+from iapb.linalg import add_multiple, dot_of, orthogonalize
 from iapb.schema import Booleans, Floats, Integers
 
-# A row counts as closing if its speed exceeds this share of |b|, the rounding of a d-term sum of
-# unit rows.
-_CLOSING = 1e-13
+# A row counts as closing if its speed exceeds this share, times d, of the terms that it is summed
+# from: some times their rounding.
+_CLOSING = 2e-15
+# A row closes no more at this share of its terms. Rows that are dependent up to a noise of 1e-13
+# count; a contact that separates does not, where it would share the impulse of others.
+_TOUCHING = 1e-12
+# A unit row that others determine up to this share is dependent on them.
+_DEPENDENT = 1e-13
+# Pushing rows still move by their impulses' rounding. Above this share of |b| it is removed.
+_STILL = 1e-13
 
 
 class PushWork(NamedTuple):
@@ -31,6 +39,20 @@ class PushWork(NamedTuple):
     held: Annotated[Booleans, "row"]  # the row is passive
     banned: Annotated[Booleans, "row"]  # the row depends on the passive rows to rounding
     more: Annotated[Floats, "row"]  # impulses of the restitution phase beyond E p_c
+    earlier: Annotated[Floats, "velocity"]  # terms that b was summed from, with their rounding
+    terms: Annotated[Floats, "velocity"]  # of the residual: earlier + |b| + |A|ᵀ p
+
+
+class ShareWork(NamedTuple):
+    """Scratch of `share_compression`; `velocity` is the number of rows and one more."""
+
+    tall: Annotated[Floats, "velocity row"]
+    aim: Annotated[Floats, "velocity"]
+    residual: Annotated[Floats, "velocity"]
+    weight: Annotated[Floats, "row"]  # 1/√(number of equal rows); 0 where p_c = 0 for certain
+    shared: Annotated[Floats, "row"]
+    slack: Annotated[Floats, "row"]
+    push: PushWork
 
 
 @kernel
@@ -42,19 +64,25 @@ def push_only(rows, count, b, p, residual, work):
         `PushWork`.
     """
     d, size, known = b.shape[0], 0, 0
+    terms = work.terms[:d]
     copy_into(residual, b)
+    for k in range(d):
+        terms[k] = work.earlier[k] + abs(b[k])
     p[:count] = 0.0
     work.held[:count] = False
     work.banned[:count] = False
-    threshold = _CLOSING * math.sqrt(dot_of(b, b)) * max(1, d)
     for _ in range(10 * (count + d) + 10):
         entering, speed = -1, 0.0
         for i in range(count):
             if not (work.held[i] or work.banned[i]):
                 closing = dot_of(rows[:, i], residual)
-                if closing < speed:
+                if closing < speed and closing < -_CLOSING * d * _size_of(rows[:, i], terms):
                     entering, speed = i, closing
-        if entering < 0 or speed >= -threshold:
+        if entering < 0:
+            for j in range(size):
+                moving = dot_of(work.q[j], residual)
+                if abs(moving) > _STILL * math.sqrt(dot_of(b, b)):
+                    add_multiple(residual, -moving, work.q[j])
             return True
         if size < d:
             work.passive[size] = entering
@@ -65,11 +93,25 @@ def push_only(rows, count, b, p, residual, work):
         work.held[entering] = True
         size, known = _retreat(rows, b, size + 1, p, work)
         for k in range(d):
-            residual[k] = b[k]
+            residual[k], terms[k] = b[k], work.earlier[k] + abs(b[k])
             for j in range(size):
-                residual[k] += rows[k, work.passive[j]] * p[work.passive[j]]
-        work.banned[:count] = False
+                term = rows[k, work.passive[j]] * p[work.passive[j]]
+                residual[k] += term
+                terms[k] += abs(term)
+        if p[entering] > 0.0:  # else rounding alone made it enter, and would again
+            work.banned[:count] = False
+        else:
+            work.banned[entering] = True
     return False
+
+
+@kernel
+def _size_of(row, terms):
+    """Return |row| · terms."""
+    total = 0.0
+    for k in range(terms.shape[0]):
+        total += abs(row[k]) * terms[k]
+    return total
 
 
 @kernel
@@ -80,7 +122,7 @@ def _solve_passive(rows, b, known, size, work):
     for j in range(known, size):
         copy_into(q[j, : b.shape[0]], rows[:, work.passive[j]])
         square = orthogonalize(q[j, : b.shape[0]], q, j, triangle[:, j])
-        if square <= _CLOSING * _CLOSING:
+        if square <= _DEPENDENT * _DEPENDENT:
             return j
         triangle[j, j] = math.sqrt(square)
         for k in range(b.shape[0]):
@@ -122,7 +164,64 @@ def _retreat(rows, b, size, p, work):
 
 
 @kernel
-def poisson_impact(d, count, restitution, clamped, work, push, impulses):
+def share_compression(d, count, restitution, tolerance, compressed, impulses, work, push, share):
+    """Replace p_c by the one of least Σ p_c² along unit rows of A, of all p_c ≥ 0 with the same
+    Aᵀp_c.
+
+    Without this, v⁺ would depend on the rows that the active set happens to choose. Rows that are
+    equal, up to a positive factor, with equal e count as one. So v⁺ does not depend on the order of
+    the rows, on their scale, or on copies. Where all e are equal or p_c is unique, it stays.
+    With the projector Π on {x : Aᵀx = 0} and p₀ = p_c − Πp_c, the least is p₀ + Πs with 0 ≤ s ⟂
+    p₀ + Πs ≥ 0. `push_only` finds 0 ≤ w ⟂ Πw + ρ p₀ ≥ 0, ρ = 1 + p₀·w/|p_c|² ≥ ½, and s = w/ρ.
+    """
+    rows, tight, kinds, lowest, highest = work.rows, push.banned, 0.0, 1.0, 0.0
+    for i in range(count):  # by complementarity p_c = 0 at every contact that separates
+        speed = dot_of(rows[:, i], compressed)
+        rounding = _TOUCHING * _size_of(rows[:, i], push.terms[:d])
+        tight[i] = work.length[i] > 0.0 and speed <= rounding
+        if tight[i]:
+            lowest, highest = min(lowest, restitution[i]), max(highest, restitution[i])
+        for k in range(d):
+            work.columns[k, i] = rows[k, i] if tight[i] else 0.0
+    if lowest >= highest:
+        return
+    rank = orthonormal_basis(d, count, tolerance, d, work)
+    shared, left, tall, weight = share.shared[:count], share.slack[:count], share.tall, share.weight
+    for i in range(count):
+        equal = 0
+        for j in range(count):
+            apart = 0.0
+            for k in range(d):
+                apart += (rows[k, i] - rows[k, j]) ** 2
+            equal += restitution[i] == restitution[j] and apart <= tolerance * tolerance
+        weight[i] = 1.0 / math.sqrt(equal) if tight[i] else 0.0
+        kinds += weight[i] * weight[i]
+        shared[i] = left[i] = impulses[i] / weight[i] if tight[i] else 0.0
+    norm = math.sqrt(dot_of(shared, shared))
+    if norm == 0.0 or kinds < rank + 0.5:
+        return
+    minimum_norm_factors(d, count, rank, weight, work)
+    aim, residual = share.aim[: count + 1], share.residual[: count + 1]
+    orthogonalize(left, work.columns, rank, aim)
+    for i in range(count):
+        shared[i] -= left[i]
+        for k in range(count):
+            tall[k, i] = 1.0 if k == i else 0.0
+            for j in range(rank):
+                tall[k, i] -= work.columns[j, k] * work.columns[j, i]
+        tall[count, i] = shared[i] / norm if abs(shared[i]) > _STILL * norm else 0.0
+    aim[:count] = 0.0
+    aim[count] = 1.0
+    found = push_only(tall, count, aim, share.slack, residual, share.push)
+    if found and residual[count] > 0.25:
+        for i in range(count):
+            impulses[i] = weight[i] * max(shared[i] + norm * residual[i] / residual[count], 0.0)
+        for k in range(d):
+            compressed[k] = work.u[k] + dot_of(rows[k], impulses[:count])
+
+
+@kernel
+def poisson_impact(d, count, restitution, tolerance, clamped, work, push, share, impulses):
     """Resolve `count` rows, after `whiten_impact`, by Poisson's law with e in [0, 1] for each, by
     two LCPs.
 
@@ -134,21 +233,25 @@ def poisson_impact(d, count, restitution, clamped, work, push, impulses):
     """
     rows, u = work.rows, work.u[:d]
     compressed, final = (
-        work.target[:d],
+        work.deviation[:d],
         work.along[:d],
     )  # whitened velocities after compression and after restitution
     if not push_only(rows, count, u, impulses, compressed, push):
         return -1, 1.0
+    copy_into(push.earlier[:d], push.terms[:d])
+    share_compression(d, count, restitution, tolerance, compressed, impulses, work, push, share)
     for i in range(count):
         returned = restitution[i] * impulses[i]
         for k in range(d):
             compressed[k] += rows[k, i] * returned
         impulses[i] += returned
-    if not push_only(rows, count, compressed, push.more, final, push):
+    solved = push_only(rows, count, compressed, push.more, final, push)
+    push.earlier[:d] = 0.0
+    if not solved:
         return -1, 1.0
     for k in range(d):
         work.change[k] = final[k] - u[k]
-    from_whitened(work.lower, work.change[:d], work.v_change)
+    write_change(d, work)
     clamp, pushing = apply_change(d, clamped, work), 0
     for i in range(count):
         impulses[i] += push.more[i]

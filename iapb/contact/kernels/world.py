@@ -12,7 +12,7 @@ from iapb.contact.kernels.broadphase import BroadPhase
 from iapb.contact.kernels.impact import ImpactWork
 from iapb.contact.kernels.impact_friction import FrictionWork
 from iapb.contact.kernels.implicit import RestWork
-from iapb.contact.kernels.unilateral import PushWork
+from iapb.contact.kernels.unilateral import PushWork, ShareWork
 from iapb.mechanics.kernels.arrays import MechanismArrays, Workspace
 from iapb.mechanics.kernels.free_motion import FreeMotion
 from iapb.schema import Booleans, Floats, Integers, States
@@ -130,6 +130,7 @@ class State(NamedTuple):
     row: Annotated[Floats, "velocity"]  # one contact row nᵀJ
     work: ImpactWork  # of the present group
     push_work: PushWork
+    share_work: ShareWork
     friction_work: FrictionWork
     rest_work: RestWork
     located_q: Annotated[Floats, "coordinate"]  # configuration of mass_matrix and lower; NaN: any

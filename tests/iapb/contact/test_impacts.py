@@ -5,12 +5,14 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
+from itertools import permutations, product
 from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.optimize import nnls
 
 from iapb import resolve_frictional_impact, resolve_impact, resolve_impacts
 from reference.complementarity import ImpactProblem
@@ -381,6 +383,113 @@ def test_nearly_parallel_contacts_converge(difference: float) -> None:
         assert found.energy_change <= 1e-13 and (rows @ found.velocity).min() >= -1e-10
 
 
+def poisson_with_least_compression(M: Floats, J: Floats, v: Floats, e: Floats) -> Floats:
+    """v⁺ of Poisson's law with the p_c ≥ 0 of least Σ W_ii p_c², by least squares: Aᵀp_c = Δu_c
+    weighs 1e6 times as much as p_c = 0."""
+    L = np.linalg.cholesky(M)
+    A = np.linalg.solve(L, J.T)
+    A = A / np.linalg.norm(A, axis=0)
+    u = L.T @ v
+    stopped = A @ nnls(A, -u)[0]
+    touching = A.T @ (u + stopped) < 1e-9 * np.linalg.norm(u)
+    goal = np.append(1e6 * stopped, np.zeros(len(J)))
+    p_c = nnls(np.vstack([1e6 * A * touching, np.eye(len(J))]), goal)[0]
+    returned = u + A @ ((1.0 + e) * p_c)
+    return np.asarray(np.linalg.solve(L.T, returned + A @ nnls(A, -returned)[0]))
+
+
+@pytest.mark.parametrize("e", [[0.0, 1.0], [1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 1.0, 1.0]])
+def test_equal_rows_of_unequal_restitution_share_the_impact(e: list[float]) -> None:
+    found = resolve_impact([[1.0]], [[1.0 + k] for k in range(len(e))], [-1.0], e)
+    assert found.velocity[0] == pytest.approx(0.5, abs=1e-15) and found.status == "complete"
+
+
+@pytest.mark.parametrize("every", [pytest.param(1, marks=pytest.mark.thorough), 17])
+@pytest.mark.parametrize("v", [[-1.0, 0.0, 0.0], [-1.0, 0.5, 0.25], [-2.0, 0.0, 3.0]])
+def test_the_order_of_four_corners_does_not_matter(v: list[float], every: int) -> None:
+    """A plate with e drawn from 0, 0.3, 0.8 and 1; with equal e the answer is that of one e."""
+    M = np.diag([1.3, 0.02, 0.03])
+    corners = np.array([[1.0, x, y] for x in (-0.2, 0.3) for y in (-0.1, 0.4)])
+    for e in np.array(list(product((0.0, 0.3, 0.8, 1.0), repeat=4)))[::every]:
+        first = resolve_impact(M, corners, v, e, method="poisson")
+        truth = poisson_with_least_compression(M, corners, np.array(v), e)
+        np.testing.assert_allclose(first.velocity, truth, atol=1e-8)
+        for order in permutations(range(4)):
+            rows = corners[list(order)] * [[1.0], [0.3], [70.0], [1.0]]
+            found = resolve_impact(M, rows, v, e[list(order)], method="poisson")
+            assert np.abs(found.velocity - first.velocity).max() <= 1e-12
+            assert exact_change(M, np.array(v), found.velocity) <= 0
+    alike = resolve_impact(M, corners, v, [0.3] * 4, method="poisson").velocity
+    assert np.array_equal(alike, resolve_impact(M, corners, v, 0.3, method="poisson").velocity)
+
+
+@given(seed=st.integers(0, 100_000), d=st.integers(1, 5), c=st.integers(2, 9))
+def test_order_scale_and_copies_of_dependent_rows_do_not_matter(seed: int, d: int, c: int) -> None:
+    M, _, v = problem(seed, d)
+    rng = np.random.default_rng(seed)
+    rank = int(rng.integers(1, d + 1))
+    rows = rng.integers(-2, 3, (c, rank)) @ rng.normal(size=(rank, d))
+    e = rng.choice([0.0, 0.3, 0.8, 1.0], c)
+    order, copies = rng.permutation(c), rng.integers(0, c, 2)
+    plain = resolve_impact(M, rows, v, e, method="poisson")
+    scaled = np.vstack([rows, rows[copies]]) * 10.0 ** rng.uniform(-3, 3, (c + 2, 1))
+    chosen = np.append(order, [c, c + 1])
+    given_twice = np.append(e, e[copies])
+    other = resolve_impact(M, scaled[chosen], v, given_twice[chosen], method="poisson")
+    size = np.sqrt(v @ M @ v)
+    apart = other.velocity - plain.velocity
+    assert np.sqrt(apart @ M @ apart) <= 1e-11 * size
+    pushed = scaled[chosen].T @ other.impulses
+    np.testing.assert_allclose(
+        M @ (other.velocity - v), pushed, atol=1e-11 * size * np.abs(M).max()
+    )
+
+
+def test_a_contact_that_is_far_slower_than_another_bounces_too() -> None:
+    for slow in (1e-10, 1e-13, 1e-20, 1e-100):
+        found = resolve_impact(np.eye(2), np.eye(2), [-1.0, -slow], [0.5, 0.25])
+        np.testing.assert_allclose(found.velocity, [0.5, 0.25 * slow], rtol=1e-14)
+        assert found.status == "complete"
+
+
+@pytest.mark.parametrize("tiny", [1e-150, 1e-200, 5e-324])
+def test_entries_that_no_contact_touches_are_kept_to_the_last_bit(tiny: float) -> None:
+    v = [1e200, tiny, 0.0]
+    for e in (0.0, 1.0):
+        found = resolve_impact(np.eye(3), [[0.0, 0.0, 1.0]], v, e)
+        assert np.array_equal(found.velocity, v) and found.status == "complete"
+
+
+def whitened_size(M: Floats, momentum: Any) -> float:
+    """|L⁻¹ p| of a momentum in extended precision."""
+    return float(np.linalg.norm(np.linalg.solve(np.linalg.cholesky(M), momentum.astype(float))))
+
+
+@pytest.mark.parametrize("kappa", [1e6, 1e10, 1e12, 1e14])
+@pytest.mark.parametrize("kind", ["factored", "poisson", "no friction", "friction"])
+def test_every_method_is_refined_for_the_given_mass_matrix(kind: str, kappa: float) -> None:
+    """Restitution and M Δv = Jᵀp + Tᵀp_t in the kinetic metric. With the rounded Cholesky factor in
+    place of M, these are 6e-5 and 2e-3 at κ = 1e12."""
+    wide = np.longdouble
+    for M, J, v in ill_conditioned(kappa, 60):
+        T = np.roll(J, 1, axis=1)[:, None]
+        if kind == "poisson":  # along −M⁻¹Jᵀp every contact of this one row pushes
+            J = J[:1] * -np.sign(J[:1] @ v)[:, None]
+        if kind in ("factored", "poisson"):
+            found = resolve_impact(M, J, v, 0.5, method=kind)
+        else:
+            mu = 0.3 if kind == "friction" else 0.0
+            found = resolve_frictional_impact(M, J, T, v, 0.5, mu)
+        length = np.linalg.norm(np.linalg.solve(np.linalg.cholesky(M), J.T), axis=0)
+        before, after = (J.astype(wide) @ w.astype(wide) / length for w in (v, found.velocity))
+        assert np.abs(after + 0.5 * before).max() <= 1e-9 * np.abs(before).max()
+        change = M.astype(wide) @ (found.velocity.astype(wide) - v)
+        pushed = J.T.astype(wide) @ found.impulses
+        if found.tangential_impulses.size:
+            pushed = pushed + T[:, 0].T.astype(wide) @ found.tangential_impulses[:, 0]
+        assert whitened_size(M, change - pushed) <= 1e-13 * kappa**0.5 * whitened_size(M, change)
+
+
 # --- friction in an impact
 # -------------------------------------------------------------------------------------------
 
@@ -399,7 +508,7 @@ def rubbing(seed: int, most: float = 2.0) -> tuple[Any, ...]:
 def test_friction_obeys_coulomb_keeps_restitution_and_gains_nothing(most: float) -> None:
     """M Δv = Jᵀp + Tᵀp_t within the cones; sticks or slides if complete; reduced no more than its
     energy demands."""
-    seen: dict[str, int] = {"complete": 0, "reduced": 0, "obeyed": 0, "cut": 0}
+    seen: dict[str, int] = {"complete": 0, "reduced": 0, "scaled": 0, "obeyed": 0}
     for seed in range(300):
         M, J, T, v, e, mu = rubbing(seed, most)
         found, plain = resolve_frictional_impact(M, J, T, v, e, mu), resolve_impact(M, J, v, e)
@@ -416,10 +525,9 @@ def test_friction_obeys_coulomb_keeps_restitution_and_gains_nothing(most: float)
         limit = mu * np.maximum(p, 0.0)
         assert np.all(np.linalg.norm(p_t, axis=1) <= limit * (1 + 1e-9) + 1e-12 * np.abs(p).max())
         seen[found.status] += 1
-        if (
-            found.friction_share < 1.0 - 1e-9 and found.status == "complete"
-        ):  # as much as keeps the energy
-            seen["cut"] += 1
+        assert found.status != "complete" or found.friction_share >= 1.0 - 1e-9
+        if found.status == "scaled":  # as much as keeps the energy
+            assert found.friction_share < 1.0
             assert found.energy_change == pytest.approx(0.0, abs=1e-9 * energy)
         elif (
             found.status == "complete"
@@ -429,7 +537,7 @@ def test_friction_obeys_coulomb_keeps_restitution_and_gains_nothing(most: float)
             seen["obeyed"] += 1
             worst = breach_of_coulomb(T, p_t, limit, found.velocity)
             assert worst <= 1e-7 * np.abs(T).max() * np.linalg.norm(v) * len(v)
-    assert seen["obeyed"] > 10 and seen["cut"] > 3 and seen["reduced"] < 30 * most
+    assert seen["obeyed"] > 10 and seen["scaled"] > 3 and seen["reduced"] < 30 * most
     assert most == 1.0 or seen["reduced"] > 0
 
 
@@ -437,7 +545,7 @@ def test_friction_obeys_coulomb_keeps_restitution_and_gains_nothing(most: float)
 def test_limits_that_swing_at_first_settle(seed: int) -> None:
     """Without damping, or with another one than half and a fifth, these do not within the
     rounds."""
-    assert resolve_frictional_impact(*rubbing(seed, 1.0)).status == "complete"
+    assert resolve_frictional_impact(*rubbing(seed, 1.0)).status in ("complete", "scaled")
 
 
 def on_the_floor(points: Any) -> tuple[Any, Any, Any]:
@@ -513,3 +621,24 @@ def test_units_change_no_bit_of_friction(seed: int, mass: int, speed: int) -> No
         other.tangential_impulses, np.ldexp(plain.tangential_impulses, speed + 2 * mass)
     )
     assert (other.friction_share, other.status) == (plain.friction_share, plain.status)
+
+
+@pytest.mark.parametrize("decades", [5.0, 15.0])
+def test_rows_of_friction_may_differ_in_size(decades: float) -> None:
+    """p scales against its row, and v⁺ stays: rows a thousand times apart and more are scaled
+    first."""
+    for seed in range(60):
+        M, J, T, v, e, mu = rubbing(seed, 0.5)
+        if len(J) > len(v):
+            continue  # where p is not unique, the choice depends on the rows' sizes
+        rng = np.random.default_rng(seed)
+        sizes = 10.0 ** np.append(-decades, rng.uniform(-decades, decades, len(J)))[: len(J)]
+        sizes[-1] = 10.0**decades
+        plain = resolve_frictional_impact(M, J, T, v, e, mu)
+        found = resolve_frictional_impact(M, J * sizes[:, None], T * sizes[:, None, None], v, e, mu)
+        pushed = (J * sizes[:, None]).T @ found.impulses
+        pushed += np.einsum("cmd,cm->d", T * sizes[:, None, None], found.tangential_impulses)
+        size = np.linalg.norm(M) * np.linalg.norm(v)
+        np.testing.assert_allclose(M @ (found.velocity - v), pushed, atol=1e-9 * size)
+        if plain.status == found.status == "complete":
+            np.testing.assert_allclose(found.velocity, plain.velocity, atol=1e-7 * size)

@@ -379,7 +379,8 @@ class Step:
                 ]
             )
             found = resolve_frictional_impact(M, J, T, v, e[0], [value[1] for value in values])
-            return found.velocity, found.impulses, found.friction_share, found.status == "complete"
+            solved = found.status in ("complete", "scaled")
+            return found.velocity, found.impulses, found.friction_share, solved
         if self.only_push(chosen) or len(set(e)) > 1:
             found = resolve_impact(M, J, v, e, method="poisson" if len(set(e)) == 1 else "factored")
             return found.velocity, found.impulses, 1.0, True
