@@ -5,12 +5,14 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from iapb.advice.distrust import UNACCOUNTED, distrust_of
 from iapb.scene import Scene, scene_from_text
 from iapb.simulation import simulate
 
@@ -119,6 +121,20 @@ def test_what_sticks_on_a_moving_body_keeps_its_place(name: str, rate: int) -> N
     turn = Rotation.from_quat(run.pose[:, 0, 3:]).inv()
     place = turn.apply(run.pose[:, 1, :3] - run.pose[:, 0, :3])
     assert np.abs(place - place[0]).max() < 100.0 / rate**2 and run.distrust == ()
+
+
+@pytest.mark.parametrize("moment", [1e-4, 3e-3])
+def test_friction_that_only_turns_a_velocity_drives_nothing(moment: float) -> None:
+    """On a light table the work of friction, booked by the way of the velocity after it, is a share
+    of the energy; what more it did is seen."""
+    plate, flat = turning(6.0)
+    light = plate | {"mass": 0.05, "inertia": [moment] * 3}
+    values = {"gravity": DOWN, "duration": 20.0, "rate": 250, "contact": {"friction": 0.8}}
+    run = simulate(made([light, flat], **values))
+    booked = run.energy["friction_work"]
+    assert run.distrust == () and booked[-1] > UNACCOUNTED * run.energy["kinetic"][0]
+    more = run.energy | {"friction_work": 1.5 * booked}
+    assert "friction drove" in distrust_of(replace(run, energy=more))[0]
 
 
 # Seams
