@@ -31,6 +31,7 @@ from verification.laws.full import (
     subject_of,
     summed,
 )
+from verification.laws.kit import CALL_LIMIT
 from verification.laws.kit import IMPACTS as KIT_IMPACTS
 from verification.laws.worlds import judge_world
 
@@ -72,6 +73,13 @@ def verify(
     unequal: Annotated[
         bool, typer.Option("--unequal", help="Also pass one restitution per contact.")
     ] = False,
+    own_process: Annotated[
+        bool,
+        typer.Option(
+            "--own-process",
+            help=f"Call the resolver in a process of its own; a call over {CALL_LIMIT:g} s is ended.",
+        ),
+    ] = False,
     full: Annotated[
         bool, typer.Option("--full", help="A million impacts and thousands of trajectories.")
     ] = False,
@@ -106,7 +114,8 @@ def verify(
             impacts=impacts or KIT_IMPACTS,
             seed=seed,
             unequal_restitution=unequal,
-            progress=partial(progress, "impacts"),
+            own_process=own_process,
+            progress=lambda *done: progress(_stage(done[1], impacts or KIT_IMPACTS), *done),
         )
     facts = {
         name: getattr(report, name)
@@ -117,6 +126,11 @@ def verify(
         "laws": [{name: getattr(one, name) for name in LAW_FIELDS} for one in report.verdicts],
     }
     return Answer(facts, [str(report)], 0 if report.passed else 1)
+
+
+def _stage(total: int, impacts: int) -> str:
+    """Name of the stage of the kit with this total."""
+    return "impacts" if total == impacts else "seconds of the search for a counterexample"
 
 
 def _full(resolver: str, impacts: int, trajectories: int, seed: int, workers: int) -> Answer:

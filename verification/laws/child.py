@@ -79,10 +79,12 @@ class Child:
             self._noted[: _NOTE.size] = _NOTE.pack(time.monotonic(), len(given))
 
     def close(self) -> None:
-        """End the processes."""
+        """End the processes; a worker that hangs is ended by its alarm."""
         with suppress(OSError):
             self._pipe.send(LAST)
         self._pipe.close()
+        with suppress(ProcessLookupError):
+            os.kill(self._keeper, signal.SIGKILL)
         os.waitpid(self._keeper, 0)
 
 

@@ -36,7 +36,7 @@ class Counterexample:
     fault : why the resolver's answer is unusable; "" if the answer breaks the law.
     calls : arguments, and v⁺ or fault, of each call that the law makes for this impact.
     earlier : pickled arguments of calls before these; without them a fresh resolver keeps the law.
-    fresh : whether a fresh resolver was seen to break the law; None if none could be made.
+    fresh : whether a fresh resolver was seen to break the law; None if there was none, or no time.
     """
 
     case: ImpactCase
@@ -54,6 +54,8 @@ class Counterexample:
             return f"{title}, which depends on earlier calls ({len(self.earlier)} in the test)"
         if self.fresh is False:
             return f"{title}, which depends on earlier calls: a fresh resolver keeps the law here"
+        if self.fresh is None and self.calls:
+            return f"{title} (no fresh resolver was tried)"
         if self.law.endswith("repeatability"):
             return f"{title}: v⁺ depends on earlier calls"
         return title
@@ -79,7 +81,7 @@ class Hunt:
     """The search for an impact that breaks a law, by the same kind of fault as the impact drawn.
 
     child : makes fresh resolvers, and makes the calls; None if the resolver itself is called.
-    ends : time of `time.monotonic` at which the search ends.
+    seconds : time of the search; half of it is kept for fresh resolvers.
     tell : called at each try.
     """
 
@@ -90,12 +92,14 @@ class Hunt:
         bounds: Bounds,
         resolver: Resolver,
         child: Child | None,
-        ends: float,
+        seconds: float,
         tell: Callable[[], None],
     ) -> None:
         self.law, self.kind, self.bounds = law, kind_of(fault), bounds
         self.resolver, self.child = child or resolver, child
-        self.ends, self.tell = ends, tell
+        self.ends = time.monotonic() + seconds
+        self.half = self.ends if child is None else self.ends - 0.5 * seconds
+        self.tell = tell
 
     def breaks(
         self, case: ImpactCase, least: float = 0.0, earlier: Sequence[bytes] | None = None
@@ -103,7 +107,8 @@ class Hunt:
         """Whether the impact breaks the law with a residual of `least` or more; if `earlier` calls
         are given, by a fresh resolver after these calls."""
         self.tell()
-        if time.monotonic() > self.ends or (earlier is not None and not self.replays(earlier)):
+        left = (self.ends if earlier is not None else self.half) - time.monotonic()
+        if left <= 0.0 or (earlier is not None and not self.replays(earlier)):
             return False
         residual, fault = residual_of(self.law, replace(case), self.resolver, self.bounds)
         if residual is None or residual.passed or kind_of(fault) != self.kind:
@@ -129,26 +134,25 @@ class Hunt:
             fails = partial(self.breaks, least=least)
             found = search(fails)
             failing = [case for case in (found, *drawn) if case is not None and fails(case)]
-            if failing:
-                smallest = shrink(min(failing, key=_size), fails)
-                if self.child is None or self.breaks(smallest, least, ()):
-                    return smallest
-            fails = partial(self.breaks, least=least, earlier=())
-            failing = [case for case in drawn if fails(case)]
-            if failing:
-                return shrink(min(failing, key=_size), fails)
-        return None
+            if not failing:
+                continue
+            smallest = shrink(min(failing, key=_size), fails)
+            if self.child is None or self.breaks(smallest, least, ()):
+                return smallest
+            break
+        fails = partial(self.breaks, earlier=())
+        fresh = next((case for case in drawn if fails(case)), None)
+        return None if fresh is None else shrink(fresh, fails)
 
     def after_calls(
         self, case: ImpactCase, calls: Sequence[bytes]
     ) -> tuple[ImpactCase, tuple[bytes, ...]] | None:
         """Return an impact that a fresh resolver fails after some of these calls, and those; None if
         it keeps the law after all of them."""
-        own = pickle.dumps(case.given())
-        before = [list(calls)]
-        if own in calls:
-            before.insert(0, before[0][: len(calls) - 1 - calls[::-1].index(own)])
-        earlier = next((tried for tried in before if self.breaks(case, earlier=tried)), None)
+        own, every = pickle.dumps(case.given()), list(calls)
+        before = every[: len(every) - 1 - every[::-1].index(own)] if own in every else every
+        tried = (some for given in (before, every) for some in _parts(given))
+        earlier = next((some for some in tried if self.breaks(case, earlier=some)), None)
         if earlier is None:
             return None
         for count in (1, len(earlier)):  # the same call again and again says it best
@@ -189,6 +193,16 @@ class Hunt:
         self.replays(earlier)
         residual_of(self.law, replace(case), recorded, self.bounds)
         return tuple(calls)
+
+
+def _parts(calls: list[bytes]) -> Iterator[list[bytes]]:
+    """Yield the last call, the first, the last two, …, and all calls."""
+    size = 1
+    while size < len(calls):
+        yield calls[-size:]
+        yield calls[:size]
+        size *= 2
+    yield calls
 
 
 def _again(case: ImpactCase, count: int) -> list[bytes]:

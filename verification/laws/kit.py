@@ -42,7 +42,7 @@ from verification.laws.resolver import Resolver, Watched
 IMPACTS = 5000  # default: about a minute for a resolver that takes 50 µs per call
 PATIENCE = 600.0  # [s] ten times as long
 CALL_LIMIT = 60.0  # [s]
-SHRINKING = 30.0  # [s] for a counterexample
+SHRINKING = 60.0  # [s] for a counterexample
 LITTLE_TIME = 2.0  # [s] for it where the patience is at its end
 ITERATED = 1e-4  # largest residual that the accuracy of an iteration may explain
 
@@ -347,7 +347,10 @@ def check_passivity(
     bounds = terms.bounds if bounds is None else bounds
     condition = terms.largest_condition if largest_condition is None else largest_condition
     verdicts = {name: LawVerdict(name, statement=law.statement) for name, law in chosen.items()}
-    with child_of(resolver, call_limit, name_of(resolver)) as child, one_thread():
+    terms.draw(
+        np.random.default_rng(seed), 0, condition
+    )  # fresh resolvers need not load its solver
+    with one_thread(), child_of(resolver, call_limit, name_of(resolver)) as child:
         if own_process and child is None:
             raise ArgumentError("own_process", True, "False where no process can be forked")
         called = child if own_process and child else resolver
@@ -534,9 +537,8 @@ class _Hunts(NamedTuple):
                 spent = min(time.monotonic() - began, seconds)
                 self.progress(int(spent), int(seconds))
 
-        bounds = self.trial.bounds
-        ends = began + seconds
-        return Hunt(self.trial.laws[law], fault, bounds, self.resolver, self.child, ends, tell)
+        given = self.trial.laws[law], fault, self.trial.bounds, self.resolver, self.child
+        return Hunt(*given, seconds, tell)
 
 
 def _counterexamples(hunts: _Hunts) -> Iterator[Counterexample]:
@@ -570,11 +572,12 @@ def _counterexample(
         return search_counterexample(fails, examples, seed, kind) if examples else None
 
     case, earlier = hunt.smallest(drawn, search), tuple[bytes, ...]()
-    fresh = None if hunts.child is None else case is not None
-    if case is None:
-        later = hunt.after_calls(*broken.first_calls[bool(fault)])
-        if later is not None:
-            (case, earlier), fresh = later, True
+    later = None if case else hunt.after_calls(*broken.first_calls[bool(fault)])
+    if later is not None:
+        case, earlier = later
+    fresh = None
+    if hunts.child is not None and (case is not None or time.monotonic() < hunt.ends):
+        fresh = case is not None
     case = drawn[0] if case is None else case
     calls = hunt.calls_for(case, earlier)
     return Counterexample(case, broken.law, fault, calls, earlier, fresh)

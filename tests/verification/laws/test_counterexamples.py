@@ -68,6 +68,7 @@ def test_what_depends_on_earlier_calls_is_printed_with_them(make: Callable[[], A
         assert residual is not None and residual.passed
 
 
+@pytest.mark.thorough
 def test_a_wrong_answer_and_no_answer_are_both_shown() -> None:
     report = check_passivity(gains_or_raises, impacts=30, search=0)
     gains, raises = report.found
@@ -92,6 +93,7 @@ def test_the_calls_shown_are_those_that_the_law_makes(law: str, contract: str) -
     assert given[3] == 1.0 if law == "elastic" else np.all(given[1] @ given[2] >= 0.0)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("fault", "words"),
     [(hangs, "gave no answer within 0.5 s"), (lambda *_: ctypes.string_at(0), "by SIGSEGV")],
@@ -139,6 +141,7 @@ def test_a_child_is_the_resolver_and_starts_anew() -> None:
         child.close()
 
 
+@pytest.mark.thorough
 def test_nothing_of_the_resolver_is_printed_while_the_kit_searches(
     capfd: pytest.CaptureFixture[str],
 ) -> None:
@@ -154,6 +157,7 @@ def test_nothing_of_the_resolver_is_printed_while_the_kit_searches(
     assert told[-1] and "loud" not in capfd.readouterr().out
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("resolver", "words"),
     [
