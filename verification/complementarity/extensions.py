@@ -85,7 +85,7 @@ def with_friction(study: Study, case: tuple[float, float], seed: int = 44) -> Ro
         for gains, v_plus in ((of_ncp, ncp), (of_ccp, ccp)):
             if v_plus is not None:
                 gains.append(_gain(impact, v_plus))
-        if ncp is None or ours.status != "complete":
+        if ncp is None or ours.status not in ("complete", "scaled"):
             unsolved += 1
             continue
         distances.append(_distance(impact, ours.velocity, ncp))

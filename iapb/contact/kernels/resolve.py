@@ -167,10 +167,10 @@ def resolve_each(batch, tolerance, budget, clamped):
             return m
         if pushes and not separates(jacobians[m], velocities[m], v_plus):
             status = NOT_SOLVED
-        out.numbers[m, 0], out.numbers[m, 1] = (
-            rank,
-            CANCELLED if clamp == 0.0 or rounded else status,
-        )
+        if clamp == 0.0:
+            moving = is_moving(jacobians[m], velocities[m], pushes)
+            status = CANCELLED if moving else COMPLETE
+        out.numbers[m, 0], out.numbers[m, 1] = rank, CANCELLED if rounded else status
         out.numbers[m, 5], out.numbers[m, 6] = clamp, share
     return n
 
@@ -240,12 +240,29 @@ def separates(jacobian, v, v_plus):
     for i in range(jacobian.shape[0]):
         largest = max(largest, abs(dot_of(jacobian[i], v)))
     for i in range(jacobian.shape[0]):
-        terms = 0.0
-        for k in range(v.shape[0]):
-            terms += abs(jacobian[i, k] * v_plus[k])
         closing = -dot_of(jacobian[i], v_plus)
-        separate = separate and closing <= max(_UNSOLVED * largest, _ROUNDED * terms)
+        separate = separate and closing <= max(_UNSOLVED * largest, _rounding(jacobian[i], v_plus))
     return separate
+
+
+@kernel
+def is_moving(jacobian, v, pushes):
+    """Whether a contact moves by more than rounding, or closes if contacts only push; else v⁺ = v is
+    right."""
+    moving = False
+    for i in range(jacobian.shape[0]):
+        speed = dot_of(jacobian[i], v)
+        moving = moving or (-speed if pushes else abs(speed)) > _rounding(jacobian[i], v)
+    return moving
+
+
+@kernel
+def _rounding(row, v):
+    """Return a bound of the rounding of row · v, some times as large."""
+    total = 0.0
+    for k in range(v.shape[0]):
+        total += abs(row[k] * v[k])
+    return _ROUNDED * total
 
 
 @kernel

@@ -40,7 +40,7 @@ class PushWork(NamedTuple):
     banned: Annotated[Booleans, "row"]  # the row depends on the passive rows to rounding
     more: Annotated[Floats, "row"]  # impulses of the restitution phase beyond E p_c
     earlier: Annotated[Floats, "velocity"]  # terms that b was summed from, with their rounding
-    terms: Annotated[Floats, "velocity"]  # of the residual: earlier + |b| + |A|ᵀ p
+    terms: Annotated[Floats, "velocity"]  # of the residual: earlier + |b| + p of each row in it
 
 
 class ShareWork(NamedTuple):
@@ -95,9 +95,9 @@ def push_only(rows, count, b, p, residual, work):
         for k in range(d):
             residual[k], terms[k] = b[k], work.earlier[k] + abs(b[k])
             for j in range(size):
-                term = rows[k, work.passive[j]] * p[work.passive[j]]
-                residual[k] += term
-                terms[k] += abs(term)
+                entry = rows[k, work.passive[j]]
+                residual[k] += entry * p[work.passive[j]]
+                terms[k] += p[work.passive[j]] if entry != 0.0 else 0.0
         if p[entering] > 0.0:  # else rounding alone made it enter, and would again
             work.banned[:count] = False
         else:
@@ -107,10 +107,11 @@ def push_only(rows, count, b, p, residual, work):
 
 @kernel
 def _size_of(row, terms):
-    """Return |row| · terms."""
+    """Return the sum of the terms that a unit row meets. Rounding of a row is a share of its length,
+    not of its entries."""
     total = 0.0
     for k in range(terms.shape[0]):
-        total += abs(row[k]) * terms[k]
+        total += terms[k] if row[k] != 0.0 else 0.0
     return total
 
 
@@ -236,10 +237,17 @@ def poisson_impact(d, count, restitution, tolerance, clamped, work, push, share,
         work.deviation[:d],
         work.along[:d],
     )  # whitened velocities after compression and after restitution
+    for k in range(d):
+        push.earlier[k] = 0.0
+        for i in range(k, d):
+            push.earlier[k] += abs(work.lower[i, k] * work.v[i])
     if not push_only(rows, count, u, impulses, compressed, push):
+        push.earlier[:d] = 0.0
         return -1, 1.0
     copy_into(push.earlier[:d], push.terms[:d])
     share_compression(d, count, restitution, tolerance, compressed, impulses, work, push, share)
+    for k in range(d):  # as before, for what follows
+        copy_into(work.columns[k, :count], rows[k])
     for i in range(count):
         returned = restitution[i] * impulses[i]
         for k in range(d):
