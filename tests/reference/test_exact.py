@@ -12,7 +12,13 @@ from hypothesis import strategies as st
 
 from iapb.errors import ArgumentError
 from reference import exact
-from reference.exact import bulk_energy_gain, exact_impact, independent_rows, relative_energy_gain
+from reference.exact import (
+    bulk_energy_gain,
+    exact_impact,
+    exact_rank,
+    independent_rows,
+    relative_energy_gain,
+)
 
 SMALL = st.integers(-4, 4)
 
@@ -109,3 +115,14 @@ def test_a_gain_beyond_the_range_of_doubles_is_a_gain(arguments: Any, gain: floa
 def test_refusals(call: Any, arguments: Any, says: str) -> None:
     with pytest.raises(ArgumentError, match=says):
         call(*arguments)
+
+
+def test_the_rank_modulo_a_prime_is_that_of_rational_numbers() -> None:
+    """Rows dependent exactly, to the last bit only, and in units hundreds of decades apart."""
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        c, d, rank = rng.integers(1, 7, size=3)
+        whole = rng.integers(-3, 4, size=(c, rank)) @ rng.integers(-9, 10, size=(rank, d))
+        rows = whole * 2.0 ** rng.integers(-300, 300)
+        for tried in (rows, rows * rng.normal(size=(c, 1)), 0.0 * rows):
+            assert exact_rank(tried) == len(independent_rows(tried))

@@ -271,3 +271,19 @@ def test_projection_obeys_moreau(x: list[float], mu: float) -> None:
     assert np.abs(project_on_cone(inside, friction) - inside).max() <= 1e-12
     assert abs((inside * rest).sum()) <= 1e-12
     assert rest[0, 0] >= mu * np.linalg.norm(rest[0, 1:]) - 1e-12
+
+
+@pytest.mark.parametrize("name", ["daqp", "lemke", "enumeration", "cvxpy_clarabel", "cvxpy_osqp"])
+def test_opposed_contacts_whose_velocities_are_rounding_have_an_answer(name: str) -> None:
+    """J v is rounding of v, and contradicts itself on dependent rows: J v = (1e-17, 1e-17) between
+    two walls."""
+    rng = np.random.default_rng(4)
+    for _ in range(5):
+        half = rng.integers(-4, 5, size=(3, 2)) @ rng.normal(size=(2, 4))
+        rows = np.vstack([half, -half])
+        unseen = np.linalg.svd(rows)[2][2:]
+        v = unseen.T @ rng.normal(size=2)
+        solution = solve(
+            ImpactProblem.from_impact(np.diag([1.0, 2.0, 0.1, 3.0]), rows, v, 0.5), name
+        )
+        assert np.abs(solution.velocity_plus - v).max() <= 1e-14

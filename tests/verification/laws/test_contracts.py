@@ -101,6 +101,7 @@ def test_gains_in_real_arithmetic_are_graded() -> None:
         ),
         ({"seed": -1}, "seed = -1: expected a whole number"),
         ({"seed": 1.5}, "seed = 1.5"),
+        ({"call_limit": 0.0}, "call_limit = 0.0: expected seconds above 0"),
         ({"seed": "3"}, "seed = "),
     ],
 )
