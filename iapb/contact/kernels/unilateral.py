@@ -237,12 +237,7 @@ def poisson_impact(d, count, restitution, tolerance, clamped, work, push, share,
         work.deviation[:d],
         work.along[:d],
     )  # whitened velocities after compression and after restitution
-    for k in range(d):
-        push.earlier[k] = 0.0
-        for i in range(k, d):
-            push.earlier[k] += abs(work.lower[i, k] * work.v[i])
     if not push_only(rows, count, u, impulses, compressed, push):
-        push.earlier[:d] = 0.0
         return -1, 1.0
     copy_into(push.earlier[:d], push.terms[:d])
     share_compression(d, count, restitution, tolerance, compressed, impulses, work, push, share)
