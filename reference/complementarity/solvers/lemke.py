@@ -19,6 +19,7 @@ from reference.complementarity.solvers import import_alone
 
 _SOFTER = 1e-12  # added to the diagonal of a unit W
 _APART = 1e-14  # added to a unit b, so that opposed contacts do not tie
+_PIVOTS = 100  # for each contact: quantecon's own limit of a million lets it cycle for minutes
 _STATUS = {0: "solution found", 1: "iteration limit", 2: "ray termination"}
 
 
@@ -35,9 +36,10 @@ def solve(problem: ImpactProblem) -> Answer:
         velocity_scale(problem),
     )
     w, b = problem.delassus / inertia, problem.offset / speed
-    result = lcp_lemke(w, b)
+    most = _PIVOTS * (problem.size + 1)
+    result = lcp_lemke(w, b, max_iter=most)
     if not result.success:  # a W without zero eigenvalues has no rays
-        result = lcp_lemke(w + _SOFTER * np.eye(problem.size), b + _APART)
+        result = lcp_lemke(w + _SOFTER * np.eye(problem.size), b + _APART, max_iter=most)
         push = np.flatnonzero(result.z > 0.0)
         left = -b[push] - w[push] @ result.z
         result.z[push] += np.linalg.lstsq(w[np.ix_(push, push)], left, rcond=_SOFTER)[0]
