@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from iapb.compiled import Entry, block, copy_into, kernel
-from iapb.contact.kernels.step import STATUS_TEXT, advance, contact_state
+from iapb.contact.kernels.motion import STATUS_TEXT
+from iapb.contact.kernels.step import advance, contact_state
 from iapb.haptics.rendering import NO_COUPLING, couple, move_device, render
 from iapb.linalg import load, store
 from iapb.run import MADE_AFTERWARDS, ContactTable, ImpactTable, Run
@@ -36,21 +37,24 @@ Coordinates = tuple[int, int, int, int]
 
 
 class Record(NamedTuple):
-    """Memory for up to n steps of at most c contacts and t trees, with the names of `iapb.run`."""
+    """Memory for up to n steps of at most c contacts and m impacts, with the names of `iapb.run`."""
 
     used: np.ndarray  # (3,) int64: steps, contacts and impacts written so far
     steps: Any  # n lines, with the states at the *end* of each step
     contacts: Any  # n c lines
-    impacts: Any  # n t lines, one per island and step
+    impacts: (
+        Any  # n m lines, one per island and impact; the time is that since the start of the step
+    )
 
 
-def make_record(steps: int, coordinates: Coordinates, contacts: int, trees: int) -> Any:
-    """Allocate a record; `coordinates` = (nq, d, nq_t, d_t)."""
+def make_record(steps: int, coordinates: Coordinates, contacts: int, impacts: int) -> Any:
+    """Allocate a record of steps with at most so many contacts and impacts; `coordinates` = (nq, d,
+    nq_t, d_t)."""
     lengths = {
         "time": steps,
         "step": steps,
         "contact": steps * contacts,
-        "impact": steps * trees,
+        "impact": steps * impacts,
         "axis": 3,
     }
     lengths |= zip(
@@ -111,6 +115,8 @@ def _write_tables(record, step, state):
         impact.scale[m], impact.clamp[m] = log.scale[i], log.clamp[i]
         impact.energy_lost[m], impact.friction_share[m] = log.energy_lost[i], log.friction_share[i]
         impact.approaching[m], impact.solved[m] = log.approaching[i], log.solved[i]
+        impact.time[m] = log.time[i]
+        copy_into(impact.q[m], log.q[i])
         copy_into(impact.v_minus[m], log.v_minus[i])
         copy_into(impact.v_plus[m], log.v_plus[i])
         copy_into(impact.impulse[m], log.impulse[i])

@@ -66,7 +66,7 @@ class Recorder:
             "device_v": port.device_v.copy(),
         }
         self.coordinates = len(state.q), len(state.v), len(port.device_q), len(port.device_v)
-        self.shape = self.coordinates, system.capacity, len(system.mechanism.tree_dofs)
+        self.shape = self.coordinates, system.capacity, system.most_impacts
         self._line_bytes = sum(array.nbytes for array in make_record(1, *self.shape).arrays()[1:])
         self.records: list[Any] = []  # of the steps held
         self.timings: list[tuple[int, float]] = []  # steps and seconds of each chunk
@@ -153,8 +153,9 @@ class Recorder:
         )
         steps, impacts = self.joined("steps"), self.joined("impacts")
         offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(steps.pop("contact_count"))])
-        struck = steps["q"][impacts["step"] - self.first]
-        impacts |= {"time": impacts["step"] * system.dt, "q": struck}
+        if not simulation.compiled:  # a law written in Python logs no configuration
+            impacts["q"] = steps["q"][impacts["step"] - self.first]
+        impacts["time"] += impacts["step"] * system.dt
         ledger, planar = self._ledger, not isinstance(scene, SpatialScene)
         later: dict[str, Any] = {
             "scene_source": Later(lambda run: scene.source_text),
@@ -183,7 +184,7 @@ class Recorder:
             time=np.arange(self.first, self.steps + 1, dtype=np.float64) * system.dt,
             **steps,
             contacts=ContactTable(offsets, **self.joined("contacts")),
-            impacts=ImpactTable(**impacts, mass_digest=_mass_digests(mechanism, struck)),
+            impacts=ImpactTable(**impacts, mass_digest=_mass_digests(mechanism, impacts["q"])),
             effects=tuple(
                 EffectRow(one.name, one.active, one.reason, one.ignores)
                 for one in simulation.effects

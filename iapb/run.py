@@ -107,12 +107,14 @@ class ImpactTable:
             "first 8 bytes of BLAKE2b of M made again from the recorded q, as a signed integer",
         ),
     ]
-    time: Annotated[Floats, quantity("impact", "s", "when it happened: the start of its step")]
+    time: Annotated[
+        Floats, quantity("impact", "s", "when it happened, in its step: at its start or at a touch")
+    ]
     q: Annotated[Floats, quantity("impact coordinate", POSITION, "configuration at that time")]
 
 
-# columns of ImpactTable that are made after the run
-MADE_AFTERWARDS = ("mass_digest", "time", "q")
+# column of ImpactTable that is made after the run
+MADE_AFTERWARDS = ("mass_digest",)
 
 
 def digests(matrices: Floats) -> Integers:

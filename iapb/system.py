@@ -10,16 +10,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from iapb.advice.effects import EFFECT_NAMES, Effect, active_names, decide_for
+from iapb.advice.solids import solids_of
 from iapb.compiled import Entry, block
-from iapb.contact.geometry import ContactBuffer, contact_capacity
-from iapb.contact.kernels.broadphase import make_broad_phase
+from iapb.contact.geometry import ContactBuffer, Shapes, contact_capacity
+from iapb.contact.kernels.broadphase import bounding_sphere, make_broad_phase
 from iapb.contact.kernels.impact import ImpactWork
 from iapb.contact.kernels.impact_friction import FrictionWork
 from iapb.contact.kernels.implicit import RestWork
+from iapb.contact.kernels.motion import STATUS_TEXT, TOO_MANY_CONTACTS
 from iapb.contact.kernels.narrow_phase import detect
-from iapb.contact.kernels.step import STATUS_TEXT, TOO_MANY_CONTACTS
+from iapb.contact.kernels.touch import MOST
 from iapb.contact.kernels.unilateral import PushWork, ShareWork
-from iapb.contact.kernels.world import State, Switches, World
+from iapb.contact.kernels.world import Cut, State, Sweep, Switches, World
 from iapb.contact.laws import ImpulseAugmented
 from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling, UnilateralCoupler
@@ -148,15 +150,19 @@ class System:
             ),
         )
         ranges = np.array(mechanism.tree_dofs, np.int64).reshape(-1, 2)
+        own = [0 if body.mimic else body.joint.layout.nq for body in mechanism.bodies]
         world: Any = block(
             World(
                 mechanism=mechanism.block,
                 shapes=self.shapes,
                 pairs=self.pairs,
                 broad_phase=make_broad_phase(self.shapes, self.pairs),
+                sweep=_sweep_of(self.shapes, mechanism),
                 tree_of_body=mechanism.tree_of_body,
                 tree_start=np.ascontiguousarray(ranges[:, 0]),
                 tree_stop=np.ascontiguousarray(ranges[:, 1]),
+                tree_of_coordinate=np.repeat(mechanism.tree_of_body, own),
+                tree_of_dof=mechanism.tree_of_body[mechanism.arrays.dof_body[: mechanism.nv]],
                 tree_mass=scene_parts.tree_masses(scene, mechanism),
                 switches=switches,
                 dt=self.dt,
@@ -196,7 +202,12 @@ class System:
         """A port without a coupling, and a record that is never written."""
         port = self.make_port(NoCoupling())
         coordinates = self.mechanism.nq, self.mechanism.nv, len(port.device_q), len(port.device_v)
-        return port, make_record(1, coordinates, self.capacity, len(self.mechanism.tree_dofs))
+        return port, make_record(1, coordinates, self.capacity, self.most_impacts)
+
+    @property
+    def most_impacts(self) -> int:
+        """Lines of the log of impacts: one for each tree, and some for a step that is cut."""
+        return len(self.mechanism.tree_dofs) + MOST * self.scene.contact.at_touch
 
     def make_state(self) -> Any:
         """Return a new state at the scene's start."""
@@ -210,7 +221,9 @@ class System:
         )  # per-body rows have no slip: no friction in impacts
         soft = contact.forces == "implicit" or bool(self.joint_friction.any())
         uneven = len(self.restitutions) > 1
-        log = blank(IMPACTS[1:], {"impact": trees, "velocity": d})
+        log = blank(
+            IMPACTS[1:], {"impact": self.most_impacts, "coordinate": mechanism.nq, "velocity": d}
+        )
         for name, value in {
             "scale": 1,
             "clamp": 1,
@@ -228,6 +241,15 @@ class System:
             contacts=zeros_of(ContactBuffer, contact=c),
             previous=zeros_of(ContactBuffer, contact=c),
             scratch_contacts=zeros_of(ContactBuffer, contact=c),
+            arriving=zeros_of(ContactBuffer, contact=c * contact.at_touch),
+            cut=zeros_of(
+                Cut,
+                coordinate=mechanism.nq,
+                velocity=d,
+                tree=trees,
+                row=rows,
+                contact=c * contact.at_touch,
+            ),
             work=zeros_of(ImpactWork, velocity=d, row=rows),
             push_work=zeros_of(PushWork, velocity=d, row=rows),
             share_work=zeros_of(ShareWork, velocity=(rows + 1) * uneven, row=rows * uneven),
@@ -254,6 +276,7 @@ class System:
         _factored(state.mass_matrix, state.lower)
         state.group_of_tree[:] = state.island_of_tree[:] = np.arange(trees)
         state.located_q[:] = np.nan
+        state.h[:], state.moving[:], state.cut.arriving[:] = self.dt, True, -1
         return block(state)
 
     def make_port(
@@ -369,3 +392,17 @@ def coupling_of(scene: Scene, name: str) -> Coupling:
             "coupling", name, f"a scene with couplings.{field}; {scene.name} gives no gains for it"
         )
     return kinds[name](tuple(gains.stiffness), tuple(gains.damping))
+
+
+def _sweep_of(shapes: Shapes, mechanism: Mechanism) -> Sweep:
+    """Return what the search for touches within a step needs of all shapes."""
+    spheres = [bounding_sphere(shapes, i) for i in range(len(shapes.kind))]
+    middle = np.array([middle for middle, _ in spheres], np.float64).reshape(-1, 3)
+    radius = np.array([radius for _, radius in spheres], np.float64)
+    thin = np.full(len(spheres), np.inf)
+    for i, solid in solids_of(shapes).items():
+        thin[i] = solid.thin
+    reach = (np.linalg.norm(middle, axis=1) + radius)[shapes.body >= 0].max(initial=0.0)
+    linked = any(body.parent is not None for body in mechanism.bodies)
+    lever = np.inf if linked else np.sqrt(3.0) * (1.0 + reach)
+    return Sweep(middle, radius, thin, float(thin.min(initial=np.inf)), float(lever))

@@ -302,7 +302,10 @@ def _pieces(run: Run, step: Integers) -> Iterator[Any]:
                 slice(offsets[0], offsets[-1]),
                 ("body_a", "body_b", "point", "normal", "impulse"),
             ),
-            "impacts": (slice(*hits), ("v_minus", "v_plus", "impulse", "scale", "mass_digest")),
+            "impacts": (
+                slice(*hits),
+                ("q", "v_minus", "v_plus", "impulse", "scale", "mass_digest"),
+            ),
         }
         tables: dict[str, Any] = {
             table: SimpleNamespace(
@@ -318,7 +321,6 @@ def _pieces(run: Run, step: Integers) -> Iterator[Any]:
             law=run.law,
             law_settings=run.law_settings,
             scene_resolved=run.scene_resolved,
-            q=run.q[first:last],
             impulse=run.impulse[first:last],
             before=int(hits[0]),
             **tables,
@@ -329,12 +331,11 @@ def _pieces(run: Run, step: Integers) -> Iterator[Any]:
 def _total(run: Any) -> float:
     """Return `Certificate.total` of a piece, whose numbers must be finite."""
     table, contacts, sums, size = run.impacts, run.contacts, -run.impulse, np.abs(run.impulse)
-    for name in ("v_minus", "v_plus", "impulse", "scale"):
+    for name in ("q", "v_minus", "v_plus", "impulse", "scale"):
         _finite(f"impacts.{name}", getattr(table, name))
     for name in ("impulse", "normal", "point"):
         _finite(f"contacts.{name}", getattr(contacts, name)[contacts.impulse != 0.0])
     _finite("impulse", run.impulse)
-    _finite("q", run.q[table.step])
     np.add.at(sums, table.step, table.impulse)
     np.add.at(size, table.step, np.abs(table.impulse))
     return _largest_share(np.abs(sums).sum(axis=1), size.sum(axis=1))
@@ -346,7 +347,7 @@ def _batches(run: Any) -> Iterator[Batch]:
     table, mechanism = run.impacts, mechanism_of(scene_from_values(run.scene_resolved))
     for start in range(0, len(table.step), _BATCH):
         chosen = slice(start, start + _BATCH)
-        masses = mechanism.mass_matrices(run.q[table.step[chosen]])
+        masses = mechanism.mass_matrices(table.q[chosen])
         other = np.flatnonzero(digests(masses) != table.mass_digest[chosen])
         if len(other):
             raise IapbError(
@@ -512,9 +513,16 @@ def _contacts(run: Any, silent: bool) -> tuple[float, float]:
         return np.nan, np.nan
     values = restitutions_of(scene, pairs_of(scene, shapes_of(scene)))
     equality = len(values) == 1 and not run.law_settings.get("pushing")
-    steps, first, line = np.unique(impacts.step, return_index=True, return_inverse=True)
-    last = len(line) - 1 - np.unique(impacts.step[::-1], return_index=True)[1]
-    whole = np.bincount(line, impacts.scale != 1.0) == 0.0  # no impact of the step was scaled
+    # contacts are recorded at one moment: steps with impacts at different ones are not judged
+    _, first, line = np.unique(impacts.step, return_index=True, return_inverse=True)
+    moved = np.bincount(line, (impacts.q != impacts.q[first[line]]).any(axis=1)) > 0.0
+    chosen = np.flatnonzero(~moved[line])
+    step, places, scales = impacts.step[chosen], impacts.q[chosen], impacts.scale[chosen]
+    if not len(step):
+        return np.nan, np.nan
+    steps, first, line = np.unique(step, return_index=True, return_inverse=True)
+    last = len(line) - 1 - np.unique(step[::-1], return_index=True)[1]
+    whole = np.bincount(line, scales != 1.0) == 0.0  # no impact of the step was scaled
     step_of = np.repeat(np.arange(len(run.impulse)), np.diff(table.offsets))
     struck = np.flatnonzero((table.impulse != 0.0) & np.isin(step_of, steps))
     difference, size, residual = -run.impulse[steps], np.abs(run.impulse[steps]), 0.0
@@ -522,7 +530,7 @@ def _contacts(run: Any, silent: bool) -> tuple[float, float]:
         m = struck[start : start + _BATCH]
         k, normal = np.searchsorted(steps, step_of[m]), table.normal[m]  # (11), (12): nᵀ(J_a − J_b)
         rows_a, rows_b = (
-            mechanism.rows_along(run.q[steps[k]], body[m], table.point[m], normal)
+            mechanism.rows_along(places[first[k]], body[m], table.point[m], normal)
             for body in (table.body_a, table.body_b)
         )
         rows = rows_a - rows_b
@@ -530,7 +538,8 @@ def _contacts(run: Any, silent: bool) -> tuple[float, float]:
         np.add.at(difference, k, pushed)
         np.add.at(size, k, np.abs(pushed))
         if equality:
-            before, after = impacts.v_minus[first[k]], impacts.v_plus[last[k]]
+            before = impacts.v_minus[chosen[first[k]]]
+            after = impacts.v_plus[chosen[last[k]]]
             off = np.abs(
                 (rows * after).sum(axis=1) + float(values[0]) * (rows * before).sum(axis=1)
             )

@@ -15,7 +15,7 @@ import numpy as np
 
 from iapb.advice.solids import Solid, joined, solids_of
 from iapb.contact.kernels.implicit import FADING
-from iapb.mechanics.energy import FORCES, energy_ledger, moved_straight
+from iapb.mechanics.energy import FORCES, energy_ledger, lost_within, moved_straight
 from iapb.mechanics.joints import KINDS
 from iapb.mechanics.rotations import rotation_of
 from iapb.names import in_metres
@@ -195,7 +195,8 @@ def _books(seen: _Seen) -> Iterator[_Book]:
             )
             yield _balance(seen, energy, begin, np.isin(trees, chosen), " and ".join(names))
     for t, energy in ledgers.items():
-        alone, gain = mechanism.alone(t), energy["integration_residual"]
+        alone = mechanism.alone(t)
+        gain = _of_whole_steps(seen, energy["integration_residual"], slice(*ranges[t]))
         steady = (
             alone.has_constant_mass_matrix and {body.joint.kind for body in alone.bodies} <= STEADY
         )
@@ -206,6 +207,16 @@ def _books(seen: _Seen) -> Iterator[_Book]:
         yield _Book(
             run.body_names[roots[t]], energy["friction_work"], gain, at_hand, most, alone=True
         )
+
+
+def _of_whole_steps(seen: _Seen, residual: Floats, dofs: slice) -> Floats:
+    """Return the residual of one tree without the steps that were cut at its touches: their forces
+    are means, so that the work of a single tree is not known."""
+    run, begin = seen.run, seen.begin
+    forces = [run.impulse, run.penalty_force, run.friction_force]
+    touched = np.any([force[begin:, dofs].any(axis=1) for force in forces], axis=0)
+    cut = ~np.isnan(lost_within(run))[begin:] & touched
+    return np.asarray(np.cumsum(np.where(cut, 0.0, np.diff(residual, prepend=0.0))), np.float64)
 
 
 def _balance(

@@ -416,6 +416,20 @@ EFFECTS: dict[str, Rule] = {
         "stiff springs would need shorter steps",
         lambda q: "" if q.scene.contact.forces == "implicit" else "contact.forces = paper",
     ),
+    "touch": Rule(
+        lambda q: "contact.impact_time = touch: a step is cut where new contacts meet",
+        "impacts would happen at the first step that finds an overlap, with its lever arms",
+        lambda q: (
+            "contact.forces = paper"
+            if q.scene.contact.forces == "paper"
+            else "contact.impact_time = step"
+            if not q.scene.contact.at_touch
+            else f"{_by_pair(q, 'restitution')}: an impulse would be zero"
+            if q.restitutions[-1] == -1.0
+            else ""
+        ),
+        (laws.TOUCH,),
+    ),
     "supports": Rule(
         lambda q: f"up to {q.most_contacts} contacts: those that carry a load take part in impacts",
         "a body that is struck from above would sink into what carries it",
@@ -535,7 +549,7 @@ def decide_for(
         rendering = getattr(law, "rendering", "full") if rendering is None else rendering
     known = laws.ENGINE_LAWS.get(law) if isinstance(law, str) else law
     uses = (
-        laws.EVERYTHING | {laws.JOINTS, laws.JOINT_FRICTION}
+        laws.EVERYTHING | {laws.JOINTS, laws.JOINT_FRICTION, laws.TOUCH}
         if known is None
         else getattr(known, "uses", laws.EVERYTHING)
     )

@@ -86,6 +86,9 @@ class ContactBuffer(NamedTuple):
     slid: Annotated[Floats, "contact 3"]  # [m] Δt J v of the step
     rolled: Annotated[Floats, "contact 3"]  # angle of a relative to b in the step, times the normal
     drift: Annotated[Floats, "contact 3"]  # [m] a relative to b since they stick
+    span: Annotated[Floats, "contact"]  # [s] of the part of a step that `expected` is about
+    lift: Annotated[Floats, "contact"]  # [m] that it would bend off its support in this part
+    idle: Annotated[Booleans, "contact"]  # takes no part in the present part of a step
 
 
 class Shape(NamedTuple):

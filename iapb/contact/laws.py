@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 from typing import Any, NamedTuple, Protocol, Self
 
-from iapb.contact.kernels.step import STATUS_TEXT
+from iapb.contact.kernels.motion import STATUS_TEXT
 from iapb.contact.kernels.world import State
 from iapb.errors import ArgumentError, IapbError
 from iapb.names import one_of
@@ -32,6 +32,7 @@ PENALTY, IMPULSES, FRICTION, CLUSTERS, NEWNESS = (
 )
 IMPACT_FRICTION, OWN_RESTITUTION = "impact friction", "own restitution"
 JOINT_FRICTION = "joint friction"
+TOUCH = "touch"  # impacts at the moment of touch
 JOINTS = "joints"  # damping and limits of joints: a law that does not name this part ignores them
 EVERYTHING = frozenset(
     {PENALTY, IMPULSES, FRICTION, CLUSTERS, NEWNESS, IMPACT_FRICTION, OWN_RESTITUTION}
@@ -195,7 +196,7 @@ class ImpulseAugmented(_EngineLaw):
     @property
     def uses(self) -> frozenset[str]:
         """Parts of the scene that the law uses."""
-        parts = EVERYTHING | {JOINTS, JOINT_FRICTION}
+        parts = EVERYTHING | {JOINTS, JOINT_FRICTION, TOUCH}
         return parts if self.friction_in_impacts else parts - {IMPACT_FRICTION}
 
 

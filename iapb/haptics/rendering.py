@@ -6,8 +6,8 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from iapb.compiled import copy_into, kernel
+from iapb.contact.kernels.motion import LARGEST_SPEED
 from iapb.contact.kernels.narrow_phase import detect
-from iapb.contact.kernels.step import LARGEST_SPEED
 from iapb.linalg import add, cholesky, dot, load, solve_mass, transform
 from iapb.mechanics.kernels.arrays import MechanismArrays, Workspace
 from iapb.mechanics.kernels.configuration import (

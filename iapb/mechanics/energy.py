@@ -4,7 +4,8 @@ the integrator.
 Over step k the configuration moves by the displacement Dq_k = difference(q_k, q_k+1) (q_k+1 - q_k
 on vector coordinates), that is by the velocity actually integrated. The work of a force F_k held
 over the step is F_k . Dq_k: what a force sensor and a position sensor would measure. The impulse of
-step k acts at q_k on v_k, before the forces. Then, summed over the steps so far,
+step k acts at q_k on v_k, before the forces, or within the step: then the loss is that of its
+impacts. Then, summed over the steps so far,
 
     kinetic + potential - initial = hand + coupling + penalty + friction work - impact_loss +
     residual.
@@ -75,6 +76,7 @@ def energy_ledger(
     impulse: Floats,
     before: Mapping[str, float] | None = None,
     straight: bool = False,
+    lost: Floats | None = None,
 ) -> dict[str, Floats]:
     """Return the energy balance of n steps.
 
@@ -93,6 +95,9 @@ def energy_ledger(
         them.
     straight : whether free bodies moved straight, by the integrator `momentum` (see
         `Mechanism.displacements`)
+    lost : (n,) [J], optional
+        Energy lost in the impacts of each step, where these happen within it; NaN: it follows from
+        the impulse, at the beginning of the step.
 
     Returns
     -------
@@ -113,9 +118,10 @@ def energy_ledger(
     ledger = {"kinetic": kinetic, "potential": potential}
     for name, force in forces.items():
         ledger[f"{name}_work"] = port_energy(force, displacement, before.get(f"{name}_work", -0.0))
-    ledger["impact_loss"] = _summed(
-        impact_losses(mechanism, q, v, impulse), before.get("impact_loss", -0.0)
-    )
+    losses = impact_losses(mechanism, q, v, impulse)
+    if lost is not None:
+        losses = np.where(np.isnan(lost), losses, lost)
+    ledger["impact_loss"] = _summed(losses, before.get("impact_loss", -0.0))
     total = kinetic + potential
     explained = sum((ledger[f"{name}_work"] for name in forces), -ledger["impact_loss"])
     ledger["integration_residual"] = total[1:] - before.get(_AT_FIRST, total[0]) - explained
@@ -142,6 +148,16 @@ def moved_straight(run: Run) -> bool:
     return run.law_settings.get("integrator") == "momentum"
 
 
+def lost_within(run: Run) -> Floats:
+    """Return the energy lost in the impacts of each step (n,) [J]; NaN where none happens within
+    the step."""
+    impacts, lost = run.impacts, np.zeros(run.steps)
+    step = impacts.step - round(float(run.time[0]) / run.dt)
+    np.add.at(lost, step, impacts.energy_lost)
+    lost[np.setdiff1d(np.arange(run.steps), step[impacts.time > impacts.step * run.dt])] = np.nan
+    return lost
+
+
 def energy_of_run(
     run: Run,
     mechanism: Mechanism,
@@ -158,7 +174,15 @@ def energy_of_run(
     """
     forces, before = {name: getattr(run, f"{name}_force") for name in FORCES}, before or {}
     ledger = energy_ledger(
-        mechanism, gravity, run.q, run.v, forces, run.impulse, before, moved_straight(run)
+        mechanism,
+        gravity,
+        run.q,
+        run.v,
+        forces,
+        run.impulse,
+        before,
+        moved_straight(run),
+        lost_within(run),
     )
     if device is not None and run.device_q.shape[1]:
         moved = device.displacements(run.device_q)

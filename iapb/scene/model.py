@@ -136,6 +136,17 @@ class Contact(ScenePart):
         "overlap at the start; default true, with forces: paper false",
     )
 
+    impact_time: Literal["touch", "step"] = Field(
+        "touch",
+        description="touch (default): a step is cut where bodies meet; step: impacts at the start "
+        "of the step that finds an overlap, as always with forces: paper",
+    )
+
+    @property
+    def at_touch(self) -> bool:
+        """Whether impacts happen at the moment of touch."""
+        return self.impact_time == "touch" and self.forces == "implicit"
+
     @property
     def rigid(self) -> bool:
         """Whether contacts are as rigid as their masses allow: the scene gives no stiffness."""

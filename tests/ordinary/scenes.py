@@ -1108,7 +1108,7 @@ add(
         gravity=0.0,
     ),
     lambda motion: motion.angle()[-1],
-    0.019 * spin_of_landing(0.04, 0.16, 0.5, 0.5, 1.0),
+    0.0195 * spin_of_landing(0.04, 0.16, 0.5, 0.5, 1.0),  # it lands after 0.5 ms
     0.3,
     "tips",
     tolerance=0.02,

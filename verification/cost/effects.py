@@ -66,6 +66,7 @@ LEFT_OUT: dict[str, dict[str, Any]] = {  # effect -> the variant of the scene wi
             ("contact_damping", "contact.damping", 0.0),
             ("friction", "contact.friction", 0.0),
             ("clustering", "contact.cluster_distance", 0.0),
+            ("touch", "contact.impact_time", "step"),
             ("coherence", "contact.coherence_distance", 0.0),
             ("delay", "device.delay", 0),
             ("quantisation", "device.position_resolution", None),
@@ -77,7 +78,7 @@ LEFT_OUT: dict[str, dict[str, Any]] = {  # effect -> the variant of the scene wi
 # Effects that a switch of the step can turn on in a scene that does not need them; they then change
 # nothing. Friction in impacts and implicit contact are not among them, because they need arrays of
 # their own.
-_OWN_ARRAYS = ("impact_friction", "implicit_contact", "supports")
+_OWN_ARRAYS = ("impact_friction", "implicit_contact", "supports", "touch")
 SWITCHED = tuple(
     name for name in engine.Switches._fields if name in EFFECT_NAMES and name not in _OWN_ARRAYS
 )
@@ -94,6 +95,7 @@ _THROUGH_CONTACTS = {
 } | dict.fromkeys(
     (
         "impulses",
+        "touch",
         "unequal_restitution",
         "penalty_stiffness",
         "contact_damping",

@@ -86,6 +86,17 @@ class Trajectory:
         return np.asarray(mechanism.mass_matrices(q))
 
     @cached_property
+    def struck_masses(self) -> Floats:
+        """M at each impact, (k, d, d)."""
+        return np.asarray(self.system.mechanism.mass_matrices(self.run.impacts.q))
+
+    @property
+    def is_cut(self) -> bool:
+        """Whether impacts happen within steps, so that a step has more than one velocity."""
+        impacts = self.run.impacts
+        return bool((impacts.time > impacts.step * self.run.dt).any())
+
+    @cached_property
     def v_struck(self) -> Floats:
         """Velocity (n, d) after the impulse of each step and before its forces."""
         v, impulse = self.run.v[:-1].copy(), self.run.impulse
@@ -144,14 +155,14 @@ def impacts_take_energy(trajectory: Trajectory) -> Found:
     """Theorem 2: largest energy gain over its bound 10 d ε √κ(M), for M restricted to the trees
     with an impulse."""
     impacts, ratios = trajectory.run.impacts, []
-    for k, step in enumerate(impacts.step):
+    for k, whole in enumerate(trajectory.struck_masses):
         trees = [
             np.arange(a, b)
             for a, b in trajectory.system.mechanism.tree_dofs
             if impacts.impulse[k, a:b].any()
         ]
         of = np.concatenate(trees) if trees else np.arange(impacts.impulse.shape[1])
-        mass = trajectory.masses[step][np.ix_(of, of)]
+        mass = whole[np.ix_(of, of)]
         gain = relative_gain(mass, impacts.v_minus[k][of], impacts.v_plus[k][of])
         values = np.linalg.eigvalsh(mass)
         ratios.append(
@@ -171,7 +182,7 @@ def impulses_explain_impacts(trajectory: Trajectory) -> Found:
     impacts, run = trajectory.run.impacts, trajectory.run
     if not len(impacts.step):
         return None
-    masses = trajectory.masses[impacts.step]
+    masses = trajectory.struck_masses
     change = np.einsum("kij,kj->ki", masses, impacts.v_plus - impacts.v_minus)
     size = norm(masses.reshape(len(masses), -1)) * norm(
         np.hstack([impacts.v_minus, impacts.v_plus])
@@ -212,7 +223,7 @@ def forces_explain_motion(trajectory: Trajectory) -> Found:
 def velocity_moves_configuration(trajectory: Trajectory) -> Found:
     """Largest |q_{k+1} − q_k ⊕ Δt v_{k+1}|∞ over |q| + Δt |v|; rotations are integrated, as they
     are no vectors."""
-    if not trajectory.is_explained:
+    if not trajectory.is_explained or trajectory.is_cut:
         return None
     run, mechanism = trajectory.run, trajectory.system.mechanism
     if mechanism.nq == mechanism.nv:
@@ -253,7 +264,7 @@ def ledger_closes(trajectory: Trajectory) -> Found:
     np.add.at(
         losses,
         impacts.step,
-        -0.5 * np.einsum("ki,kij,kj->k", dv, trajectory.masses[impacts.step], v),
+        -0.5 * np.einsum("ki,kij,kj->k", dv, trajectory.struck_masses, v),
     )
     pairs = [(np.cumsum(works[name]), run.energy[f"{name}_work"]) for name in _FORCES]
     pairs += [

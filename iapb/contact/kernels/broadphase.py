@@ -71,7 +71,7 @@ def make_broad_phase(shapes: Shapes, pairs: Indices) -> BroadPhase:
     for a, b in pairs:
         arrays["allowed"][min(a, b), max(a, b)] = 1 if a < b else 2
     for i in range(n):
-        arrays["local_center"][i], arrays["radius"][i] = _bounding_sphere(shapes, i)
+        arrays["local_center"][i], arrays["radius"][i] = bounding_sphere(shapes, i)
     arrays["center"][:] = arrays["local_center"]
     return BroadPhase(
         moving,
@@ -84,7 +84,7 @@ def make_broad_phase(shapes: Shapes, pairs: Indices) -> BroadPhase:
     )
 
 
-def _bounding_sphere(shapes: Shapes, i: int) -> tuple[Any, float]:
+def bounding_sphere(shapes: Shapes, i: int) -> tuple[Any, float]:
     """Return the centre in the body's frame and the radius [m]: of the box around a polygon, exact
     for others."""
     if shapes.kind[i] != POLYGON:

@@ -85,24 +85,33 @@ def gather_rows(world, state, island, size):
 
 
 @kernel
-def largest_share(impulse, dofs, size, dt, force_limit):
-    """Return the largest share in [0, 1] with |share · p_i / Δt| <= the limit of each dof, in
+def largest_share(impulse, before, dofs, size, dt, force_limit):
+    """Return the largest share in [0, 1] with |P_i + share · p_i| / Δt <= the limit of each dof, in
     floating point too.
 
-    impulse (size,) [N s, N m s] of a group; dofs (size,) its coordinates; force_limit (d,) [N, N
-    m], inf = none
+    impulse (size,) p [N s, N m s] of a group; before (d,) P, of earlier impacts of the step; dofs
+    (size,) its coordinates; force_limit (d,) [N, N m], inf = none
     """
     share = 1.0
     for i in range(size):
-        force, limit = abs(impulse[i]) / dt, force_limit[dofs[i]]
+        force, limit = (
+            abs(impulse[i]) / dt,
+            room_for(impulse[i], before[dofs[i]], dt, force_limit[dofs[i]]),
+        )
         if share * force > limit:
             share = limit / force
     for i in range(size):
-        while (
-            share * abs(impulse[i]) / dt > force_limit[dofs[i]]
+        while share * abs(impulse[i]) / dt > room_for(
+            impulse[i], before[dofs[i]], dt, force_limit[dofs[i]]
         ):  # the division rounded up: one step back
             share = np.nextafter(share, 0.0)
     return share
+
+
+@kernel
+def room_for(impulse, before, dt, limit):
+    """Return what earlier impacts of the step leave of a limit, in the direction of an impulse."""
+    return max(0.0, limit - (before if impulse > 0.0 else -before) / dt)
 
 
 @kernel
@@ -303,7 +312,9 @@ def resolve_island(world, state, island):
     rank, clamp, friction_share, solved = resolve_rows(world, state, size, count)
     share, line, approaching = 1.0, log.logged[0], 0
     if world.switches.impulse_limit:
-        share = largest_share(work.momentum, state.dofs, size, world.dt, world.impulse_limit)
+        share = largest_share(
+            work.momentum, state.impulse, state.dofs, size, world.dt, world.impulse_limit
+        )
     if world.switches.spreading:
         for t in range(world.tree_start.shape[0]):
             if state.island_of_tree[t] == island:
@@ -329,6 +340,8 @@ def resolve_island(world, state, island):
         solved and clamp > 0.0,
         approaching,
     )
+    log.time[line] = state.cut.elapsed[0]
+    copy_into(log.q[line], state.q)
     copy_into(log.v_minus[line], state.v)
     copy_into(log.v_plus[line], state.v)
     log.impulse[line] = 0.0
@@ -379,11 +392,12 @@ def strike_again(world, state):
         e = pair_restitution(world, contacts, i)
         if (
             state.state_of_tree[group] == COLLIDING
+            and not contacts.idle[i]
             and e > 0.0
             and now.normal_velocity[i] < -world.approach_velocity
         ):
             contacts.mark[i], contacts.collides[i], some = STRIKES, True, True
-        elif contacts.mark[i] == STRIKES:
+        elif contacts.mark[i] == STRIKES and not contacts.idle[i]:
             contacts.mark[i], contacts.collides[i] = 0, False
     if not some:
         return False
@@ -394,6 +408,6 @@ def strike_again(world, state):
     if state.impacts.logged[0] + islands <= state.impacts.group.shape[0]:
         return True
     for i in range(count):
-        if contacts.mark[i] == STRIKES:
+        if contacts.mark[i] == STRIKES and not contacts.idle[i]:
             contacts.mark[i] = LEFT
     return False

@@ -115,7 +115,7 @@ def mark_new(contacts, count, previous, previous_count, distance, rigid):
             j = begin + k if begin + k < previous_count else begin + k - previous_count
             acted = previous.gap[j] < -TOUCHING or rigid and previous.normal_force[j] > 0.0
             if acted and (
-                _same_name(contacts, i, previous, j)
+                same_name(contacts, i, previous, j)
                 or (
                     distance > 0.0
                     and not is_stop(contacts, i)
@@ -130,7 +130,7 @@ def mark_new(contacts, count, previous, previous_count, distance, rigid):
 
 
 @kernel
-def _same_name(first, i, second, j):
+def same_name(first, i, second, j):
     """Return whether shapes and feature of two contacts are the same."""
     return (
         first.shape_a[i] == second.shape_a[j]
@@ -146,7 +146,7 @@ def contact_before(state, i, begin):
     total = state.contact_count[1]
     for k in range(total):
         j = begin + k if begin + k < total else begin + k - total
-        if _same_name(state.contacts, i, state.previous, j):
+        if same_name(state.contacts, i, state.previous, j):
             return j
     return -1
 
@@ -188,14 +188,19 @@ def classify(world, state, count):
     )
     trees, approaching = groups.shape[0], False
     for t in range(trees):
-        groups[t], states[t] = t, FREE
+        if state.moving[t]:
+            groups[t], states[t] = t, FREE
     for i in range(count):
-        join(world, contacts, i, groups)
+        if not contacts.idle[i]:
+            join(world, contacts, i, groups)
     for t in range(trees):
         groups[t] = groups[groups[t]]  # smaller trees are settled already
         if spreading[t]:
             spreading[groups[t]] = True
     for i in range(count):
+        contacts.collides[i] = False
+        if contacts.idle[i]:
+            continue
         group = group_of_contact(world, contacts, i, groups)
         collides = contacts.normal_velocity[i] < -world.approach_velocity
         contacts.collides[i] = collides
@@ -209,6 +214,7 @@ def classify(world, state, count):
             contacts.collides[i] = False
     for t in range(trees):
         states[t] = states[groups[t]]
+        state.rests[t] = states[t] != FREE if state.moving[t] else state.rests[t]
         if states[t] != COLLIDING:
             spreading[t] = False
 
@@ -266,11 +272,13 @@ def add_supports(world, state):
     """
     contacts, begin, bounces = state.contacts, 0, False
     for i in range(state.contact_count[0] if world.switches.implicit_contact else 0):
+        if contacts.idle[i]:
+            continue
         contacts.mark[i] = STRIKES if contacts.collides[i] else 0
         bounces = bounces or contacts.collides[i] and pair_restitution(world, contacts, i) > 0.0
     for i in range(state.contact_count[0] if bounces else 0):
         group = group_of_contact(world, contacts, i, state.group_of_tree)
-        if state.state_of_tree[group] != COLLIDING or contacts.collides[i]:
+        if state.state_of_tree[group] != COLLIDING or contacts.collides[i] or contacts.idle[i]:
             continue
         before = contact_before(state, i, begin)
         if before >= 0:

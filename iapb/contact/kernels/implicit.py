@@ -66,7 +66,9 @@ SEARCHES = 40  # evaluations of a line search
 # at redundant contacts are unique. A box sags by 4e-12 m at 1 kHz.
 COMPLIANCE = 1e-6
 LEAST_COMPLIANCE = 1e-12  # the same for the lightest tree; less is lost in rounding
+SHORT = 0.1  # share of a step: what a contact bends in a shorter part tells nothing of the next
 FADING = 100.0  # steps in which an overlap fades to 1/e; fewer would throw a body out of it
+BENT = 0.01  # share of the energy of a step that the arcs of contacts may seem to create
 GAIN = 1e-11  # share of the energy of a step that rounding may seem to create
 
 
@@ -119,6 +121,8 @@ def rest_implicitly(world, state, touches, rubs):
     work, contacts, some = state.rest_work, state.contacts, False
     work.first[:] = -1
     for i in range(state.contact_count[0] - 1 if touches else -1, -1, -1):
+        if contacts.idle[i]:
+            continue
         contacts.normal_force[i] = 0.0
         if rubs:
             store(contacts.friction_force, i, (0.0, 0.0, 0.0))
@@ -126,7 +130,7 @@ def rest_implicitly(world, state, touches, rubs):
         if contacts.mark[i] != LEFT:
             work.next[i], work.first[group], some = work.first[group], i, True
     for t in range(world.tree_start.shape[0] if world.switches.joint_friction else 0):
-        if is_dry(world, t):
+        if state.moving[t] and is_dry(world, t):
             group, some = state.group_of_tree[t], True
             work.first[group] = work.first[group] if work.first[group] >= 0 else DRY
     if not some:
@@ -170,17 +174,32 @@ def rest_group(world, state, group, s):
             work.dof[size], work.begin[size], work.envelope[size] = dof, begin, begin
             work.end[size] = begin + world.tree_stop[t] - world.tree_start[t]
             work.free[size], work.v[size] = state.v[dof], state.start_v[dof]
-            work.dry[size] = world.dt * world.joint_friction[dof]
+            work.dry[size] = state.h[0] * world.joint_friction[dof]
             size += 1
         t = work.next_tree[t]
     work.energy[0] = -1.0  # not known yet
-    work.stiffness[0], k = stiffness_of_group(world, work, group)
+    work.stiffness[0], k = stiffness_of_group(world, work, group, state.h[0])
     count = gather_contacts(world, state, group, s)
-    if not solve_in_turns(world, state, size, count, s, k):
+    solved = solve_in_turns(world, state, size, count, s, k)
+    if not solved or bends_too_far(world, state, size, count, s):
         work.bend[: count * s] = 0.0  # it is not in the energy that `guard` compares
         if not solve_in_turns(world, state, size, count, s, k):
             guard(world, state, size, count, s)
     give_back(world, state, size, count, s)
+
+
+@kernel
+def bends_too_far(world, state, size, count, s):
+    """Return whether what contacts bend in a step gives the bodies noticeable energy: then the step
+    is too long for their arcs."""
+    work, bends = state.rest_work, False
+    for j in range(count * s):
+        bends = bends or work.bend[j] != 0.0
+    if not bends:
+        return False
+    after = 0.5 * mass_form(world, state, size, work.v, work.v)
+    before = free_energy(world, state, size) + spring_energy(world, state, count, s, 0.0)
+    return after > (1.0 + BENT) * before
 
 
 @kernel
@@ -196,19 +215,19 @@ def solve_in_turns(world, state, size, count, s, k):
 
 
 @kernel
-def stiffness_of_group(world, work, group):
+def stiffness_of_group(world, work, group, h):
     """Return K [N/m] of a group's contacts, and k = K Δt + B [N s/m].
 
     Where the scene gives none, k follows from the masses of the group's own trees alone.
     """
     if not world.rigid:
-        return world.stiffness, world.stiffness * world.dt + world.damping
+        return world.stiffness, world.stiffness * h + world.damping
     heaviest, lightest, t = 0.0, math.inf, group
     while t >= 0:
         heaviest = max(heaviest, world.tree_mass[t])
         lightest = min(lightest, world.tree_mass[t])
         t = work.next_tree[t]
-    k = min(heaviest / COMPLIANCE, lightest / LEAST_COMPLIANCE) / world.dt
+    k = min(heaviest / COMPLIANCE, lightest / LEAST_COMPLIANCE) / h
     return k / ((1.0 + FADING) * world.dt), k
 
 
@@ -238,12 +257,21 @@ def gather_contacts(world, state, group, s):
         store(contacts.drift, i, (0.0, 0.0, 0.0))
         if before >= 0:
             begin, force = before + 1, state.previous.normal_force[before]
-            work.limit[count] = friction_of(world, contacts, i) * force * world.dt if s > 1 else 0.0
-            bend = contacts.gap[i] - state.previous.expected[before]
-            if force > 0.0 and abs(bend) > TOUCHING:
+            work.limit[count] = (
+                friction_of(world, contacts, i) * force * state.h[0] if s > 1 else 0.0
+            )
+            bend, span = (
+                contacts.gap[i] - state.previous.expected[before],
+                state.previous.span[before],
+            )
+            if force > 0.0 and abs(bend) > TOUCHING and span >= SHORT * world.dt:
+                if span < world.dt or state.h[0] < world.dt:  # it grows with the square of time
+                    bend *= world.dt / span * (state.h[0] / span)
                 work.bend[count * s] = bend / world.dt
             if force > 0.0 and s > 1:
                 follow_arc(world, state, before, i, count * s, s)
+        if contacts.lift[i] > 0.0:
+            work.bend[count * s] = contacts.lift[i] / state.h[0]
         count, i = count + 1, work.next[i]
     return count
 
@@ -348,7 +376,7 @@ def times_mass(world, state, size, v, out):
         for j in range(work.begin[i], work.end[i]):
             total += row[ahead + j] * v[j]
         if damped:
-            total += world.dt * world.joint_damping[dof] * v[i]
+            total += state.h[0] * world.joint_damping[dof] * v[i]
         out[i] = total
 
 
@@ -371,7 +399,7 @@ def push(world, state, r, s, k, share):
     """Return the normal impulse Δt f of contact r at `share` of the present step."""
     work = state.rest_work
     gap, gamma = state.contacts.gap[work.contact[r]], speed_at(work, r * s, share)
-    return world.dt * max(0.0, -work.stiffness[0] * gap - k * gamma)
+    return state.h[0] * max(0.0, -work.stiffness[0] * gap - k * gamma)
 
 
 @kernel
@@ -433,7 +461,7 @@ def open_balance(world, state, size, count, s, k):
         squares += work.p[r * s] * work.p[r * s]
     for i in range(size if world.switches.joint_friction else 0):
         work.balance[i] += dry_impulse(work, i, work.v[i])
-    given, springs = work.given[:size], 0.5 * squares / (world.dt * k) if squares > 0.0 else 0.0
+    given, springs = work.given[:size], 0.5 * squares / (state.h[0] * k) if squares > 0.0 else 0.0
     for i in range(size):  # |L⁻¹ r|² = rᵀ M⁻¹ r
         dof = work.dof[i]
         entry, row, ahead = work.balance[i], state.lower[dof], dof - i
@@ -482,13 +510,13 @@ def newton_matrix(world, state, size, count, s, k):
         for j in range(begin, i + 1):
             matrix[i, j] = state.mass_matrix[dof, dof - i + j]
         if world.switches.joint_damping:
-            matrix[i, i] += world.dt * world.joint_damping[dof]
+            matrix[i, i] += state.h[0] * world.joint_damping[dof]
         if world.switches.joint_friction and abs(work.v[i]) <= STICKING:
             matrix[i, i] += work.dry[i] / STICKING
     for r in range(count):
         n = r * s
         if work.p[n] > 0.0:
-            add_square(work, matrix, r, n, n, world.dt * k)
+            add_square(work, matrix, r, n, n, state.h[0] * k)
         slip, divisor = slide_length(work, r, s, 0.0)
         for j in range(n + 1, n + s):
             for h in range(n + 1, n + s):
@@ -639,7 +667,7 @@ def spring_energy(world, state, count, s, share):
     """Return Φ [J] at the gaps that the velocity `share` v would lead to."""
     work, total = state.rest_work, 0.0
     for r in range(count):
-        gap = min(0.0, state.contacts.gap[work.contact[r]] + share * world.dt * work.speed[r * s])
+        gap = min(0.0, state.contacts.gap[work.contact[r]] + share * state.h[0] * work.speed[r * s])
         total += 0.5 * work.stiffness[0] * gap * gap
     return total
 
@@ -673,10 +701,10 @@ def remember_points(world, state, r, s):
     store(contacts.point_b, i, material_point(state, contacts.body_b[i], x))
     _, _, omega_a = twist(world.mechanism, state.body, contacts.body_a[i], state.v)
     _, _, omega_b = twist(world.mechanism, state.body, contacts.body_b[i], state.v)
-    store(contacts.rolled, i, scale(world.dt, cross(subtract(omega_a, omega_b), n)))
-    slid = scale(world.dt * work.speed[r * s], n)
+    store(contacts.rolled, i, scale(state.h[0], cross(subtract(omega_a, omega_b), n)))
+    slid = scale(state.h[0] * work.speed[r * s], n)
     for j in range(1, s):
-        slid = add(slid, scale(world.dt * work.speed[r * s + j], tangent_of(n, j - 1, s - 1)))
+        slid = add(slid, scale(state.h[0] * work.speed[r * s + j], tangent_of(n, j - 1, s - 1)))
     store(contacts.slid, i, slid)
 
 
@@ -689,12 +717,13 @@ def give_back(world, state, size, count, s):
     for i in range(size):
         pushed[i] = rubbed[i] = 0.0
         if world.switches.joint_friction:
-            rubbed[i] = -dry_impulse(work, i, work.v[i]) / world.dt
+            rubbed[i] = -dry_impulse(work, i, work.v[i]) / state.h[0]
         state.v[work.dof[i]] = work.v[i]
     for r in range(count):
         i, force = work.contact[r], (0.0, 0.0, 0.0)
-        contacts.normal_force[i] = work.p[r * s] / world.dt
-        contacts.expected[i] = contacts.gap[i] + world.dt * work.speed[r * s]
+        contacts.normal_force[i] = work.p[r * s] / state.h[0]
+        contacts.span[i] = state.h[0]
+        contacts.expected[i] = contacts.gap[i] + state.h[0] * work.speed[r * s]
         add_along_row(work, r, r * s, contacts.normal_force[i], pushed)
         n = load(contacts.normal, i)
         contacts.sticks[i] = (
@@ -706,7 +735,7 @@ def give_back(world, state, size, count, s):
             remember_points(world, state, r, s)
         if s > 1 and work.limit[r] > 0.0:
             for j in range(1, s):
-                size_of_force = work.p[r * s + j] / world.dt
+                size_of_force = work.p[r * s + j] / state.h[0]
                 force = add(force, scale(size_of_force, tangent_of(n, j - 1, s - 1)))
                 add_along_row(work, r, r * s + j, size_of_force, rubbed)
             store(contacts.friction_force, i, force)

@@ -22,13 +22,13 @@ def is_stop(contacts, i):
 
 
 @kernel
-def add_stops(world, state, contacts, count):
-    """Append the stops that are reached after `count` contacts; return the new count, −1 if there
+def add_stops(world, state, contacts, count, margin):
+    """Append the stops with gap <= margin [m] after `count` contacts; return the new count, −1 if there
     is no room."""
     stops, w = world.stops, state.body
     for i in range(stops.bound.shape[0]):
         gap = stops.arm[i] * stops.sign[i] * (state.q[stops.coordinate[i]] - stops.bound[i])
-        if gap > 0.0:
+        if gap > margin:
             continue
         if count >= contacts.gap.shape[0]:
             return -1

@@ -11,7 +11,7 @@ from __future__ import annotations
 from iapb.compiled import kernel
 from iapb.contact.kernels.joint_stops import is_stop
 from iapb.contact.kernels.narrow_phase import detect
-from iapb.contact.kernels.shape_frames import copy_contact
+from iapb.contact.kernels.shape_frames import copy_found
 from iapb.linalg import add, dot, load, scale, store
 
 # [m] what must be left without the sag; above the rounding of positions, below a sag that matters
@@ -20,10 +20,10 @@ _SAME_NORMAL = 1.0 - 5e-7  # cosine of 1e-3 rad: such a contact carries the body
 
 
 @kernel
-def leave_out_seams(world, state, count):
+def leave_out_seams(world, state, contacts, count):
     """Drop new contacts of pairs that the sag of a resting contact explains; return how many
     contacts stay."""
-    contacts, kept, i = state.contacts, 0, 0
+    kept, i = 0, 0
     while i < count:
         stop, strikes, old = i, False, False
         while (
@@ -34,23 +34,25 @@ def leave_out_seams(world, state, count):
             strikes = strikes or contacts.normal_velocity[stop] < -world.approach_velocity
             old = old or not contacts.is_new[stop]
             stop += 1
-        if not strikes or old or is_stop(contacts, i) or not explained(world, state, i, count):
+        if (
+            not strikes
+            or old
+            or is_stop(contacts, i)
+            or not explained(world, state, contacts, i, count)
+        ):
             for k in range(i, stop):
                 if kept < k:
-                    copy_contact(contacts, kept, contacts, k)
-                    contacts.is_new[kept] = contacts.is_new[k]
-                    contacts.normal_velocity[kept] = contacts.normal_velocity[k]
-                    store(contacts.tangential_velocity, kept, load(contacts.tangential_velocity, k))
+                    copy_found(contacts, kept, contacts, k)
                 kept += 1
         i = stop
     return kept
 
 
 @kernel
-def explained(world, state, i, count):
+def explained(world, state, contacts, i, count):
     """Whether the pair of contact i does not overlap once one of its bodies is lifted out of
     another contact of the same two bodies."""
-    contacts, n = state.contacts, load(state.contacts.normal, i)
+    n = load(contacts.normal, i)
     for j in range(count):
         normal, sag = load(contacts.normal, j), 0.0
         if is_stop(contacts, j) or dot(n, normal) > _SAME_NORMAL:

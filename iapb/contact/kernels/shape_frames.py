@@ -151,3 +151,31 @@ def copy_contact(to, i, contacts, j):
     to.body_a[i], to.body_b[i], to.gap[i] = contacts.body_a[j], contacts.body_b[j], contacts.gap[j]
     store(to.point, i, load(contacts.point, j))
     store(to.normal, i, load(contacts.normal, j))
+
+
+@kernel
+def copy_found(to, i, contacts, j):
+    """Copy contact j, its velocities and whether it is new to row i of the buffer `to`."""
+    copy_contact(to, i, contacts, j)
+    to.is_new[i], to.idle[i] = contacts.is_new[j], contacts.idle[j]
+    to.normal_velocity[i], to.lift[i] = contacts.normal_velocity[j], 0.0
+    store(to.tangential_velocity, i, load(contacts.tangential_velocity, j))
+
+
+@kernel
+def copy_all(to, i, contacts, j):
+    """Copy contact j with all that a step computes of it to row i of the buffer `to`."""
+    copy_found(to, i, contacts, j)
+    to.collides[i], to.mark[i], to.sticks[i] = (
+        contacts.collides[j],
+        contacts.mark[j],
+        contacts.sticks[j],
+    )
+    to.normal_force[i], to.expected[i] = contacts.normal_force[j], contacts.expected[j]
+    to.span[i], to.lift[i] = contacts.span[j], contacts.lift[j]
+    store(to.friction_force, i, load(contacts.friction_force, j))
+    store(to.point_a, i, load(contacts.point_a, j))
+    store(to.point_b, i, load(contacts.point_b, j))
+    store(to.slid, i, load(contacts.slid, j))
+    store(to.rolled, i, load(contacts.rolled, j))
+    store(to.drift, i, load(contacts.drift, j))

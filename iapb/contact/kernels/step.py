@@ -2,81 +2,17 @@
 
 `advance` is the whole contact law: contacts (III), collisions (V), resting forces (IV), integration
 by Δt. The Penalty law is the same algorithm with the impulses switched off (e = −1, claim C09).
-
-Forces at the start of a step give the new velocity, and the bodies move with it. The scene's
-`integrator` says how:
-
-- ``momentum``, the default, moves the bodies freely (`iapb.mechanics.kernels.free_motion`): linear
-  and angular momentum are kept to rounding in the world's axes. Trees without contact get half of
-  gravity before and half after they move, so they move with order 2 under gravity, and a free rigid
-  body with order 4. With contact, or under forces of a hand or device, the order is 1.
-- ``semi_implicit_euler``, the paper's, has order 1: Coriolis terms are forces at the start of the
-  step.
-
-On quaternions and other groups q moves by integrate(q, v, dt), never by addition.
+Where impacts happen at the moment of touch, a step that brings new contacts is done in parts.
 """
 
 from __future__ import annotations
 
 from iapb.compiled import copy_into, kernel
-from iapb.contact.kernels.broadphase import near_pairs
 from iapb.contact.kernels.collide import resolve_collisions
-from iapb.contact.kernels.contact_set import (
-    CLOSE,
-    TOUCHING,
-    classify,
-    cluster,
-    group_of_contact,
-    mark_new,
-)
-from iapb.contact.kernels.implicit import is_dry, rest_implicitly
-from iapb.contact.kernels.joint_stops import add_stops
-from iapb.contact.kernels.narrow_phase import detect
-from iapb.contact.kernels.resting import resting_force
-from iapb.contact.kernels.rows import contact_velocities
-from iapb.contact.kernels.seams import leave_out_seams
-from iapb.contact.kernels.shape_frames import copy_contact
-from iapb.linalg import (
-    add,
-    add_multiple,
-    cholesky,
-    cholesky_tree_blocks,
-    load,
-    scale,
-    solve_mass,
-    solve_tree_blocks,
-    store,
-    subtract,
-)
-from iapb.mechanics.joints import SPHERICAL
-from iapb.mechanics.kernels.configuration import integrate, integrate_body
-from iapb.mechanics.kernels.dynamics import bias, gravity, mass_matrix
-from iapb.mechanics.kernels.free_motion import (
-    LINKAGE,
-    base_momentum,
-    center_of,
-    keep_momentum_and_energy,
-    linear_momentum,
-    move_simple_trees,
-    parts_of_linkages,
-    shift_root,
-    to_fixed_axes,
-)
-from iapb.mechanics.kernels.kinematics import forward_kinematics
+from iapb.contact.kernels.finding import find_contacts
+from iapb.contact.kernels.motion import NOT_POSITIVE_DEFINITE, OK, TOO_MANY_CONTACTS, locate, move
+from iapb.contact.kernels.touch import cut_at_touch, let_go
 from iapb.run import COLLIDING, FREE
-
-# Above this speed [m/s, rad/s] products of masses, stiffnesses, displacements and speeds may
-# overflow: the motion has diverged. (Scenes hold numbers up to 1e9.)
-LARGEST_SPEED = 1e100
-
-OK, NOT_POSITIVE_DEFINITE, TOO_MANY_CONTACTS, NOT_FINITE = range(4)
-STATUS_TEXT = {
-    NOT_POSITIVE_DEFINITE: "the mass matrix is not positive definite in this configuration",
-    TOO_MANY_CONTACTS: "more contacts at once than the scene's shapes can give: a fault of the "
-    "engine",
-    NOT_FINITE: "the motion left the range of numbers: the step is too long for this stiffness "
-    "and mass",
-}
 
 
 @kernel
@@ -84,7 +20,7 @@ def advance(world, state, applied):
     """Advance (q, v) by one step under the generalized force `applied` (d,); return a status."""
     for k in range(state.v.shape[0]):  # forces and impulses of the step before
         state.penalty_force[k] = state.friction_force[k] = state.impulse[k] = 0.0
-    state.impacts.logged[0] = 0
+    state.impacts.logged[0], state.h[0] = 0, world.dt
     if not locate(world, state):
         return NOT_POSITIVE_DEFINITE
     if world.switches.contacts:
@@ -92,7 +28,12 @@ def advance(world, state, applied):
             return TOO_MANY_CONTACTS
         if world.switches.impulses:
             resolve_collisions(world, state)
-    return move(world, state, applied)
+    if not world.switches.touch:
+        return move(world, state, applied)
+    let_go(world, state)
+    copy_into(state.cut.q, state.q)
+    status = move(world, state, applied)
+    return cut_at_touch(world, state, applied) if status == OK else status
 
 
 @kernel
@@ -104,312 +45,3 @@ def contact_state(state, tool_tree):
         if tool_tree in (-1, t) and (found == FREE or state.state_of_tree[t] == COLLIDING):
             found = state.state_of_tree[t]
     return found
-
-
-@kernel
-def locate(world, state):
-    """Place all bodies at q; update M and its factor if they depend on q. Return False if M is not
-    definite."""
-    forward_kinematics(world.mechanism, state.q, state.body)
-    stale = world.switches.varying_inertia
-    if world.conserving and stale:
-        stale = False
-        for i in range(state.q.shape[0]):
-            stale = stale or state.q[i] != state.located_q[i]
-        copy_into(state.located_q, state.q)
-    if not stale:
-        return True
-    mass_matrix(world.mechanism, state.body, state.mass_matrix)
-    return (
-        cholesky_tree_blocks(state.mass_matrix, world.tree_start, world.tree_stop, state.lower) == 0
-    )
-
-
-@kernel
-def find_contacts(world, state):
-    """Find the contacts (section III): cluster them, mark new ones, classify groups; return how
-    many, -1: too many."""
-    now, before = state.contacts, state.previous
-    for i in range(
-        state.contact_count[0]
-    ):  # `mark_new` and friction compare with those of the last step
-        copy_contact(before, i, now, i)
-        before.normal_force[i], before.expected[i] = now.normal_force[i], now.expected[i]
-        before.sticks[i] = now.sticks[i]
-        if world.switches.implicit_contact and world.switches.friction:
-            store(before.point_a, i, load(now.point_a, i))
-            store(before.point_b, i, load(now.point_b, i))
-            store(before.slid, i, load(now.slid, i))
-            store(before.rolled, i, load(now.rolled, i))
-            store(before.drift, i, load(now.drift, i))
-    state.contact_count[1] = state.contact_count[0]
-    count = present_contacts(world, state, now)
-    if count < 0:
-        return count
-    state.contact_count[0] = count
-    state.contact_impulse[:count] = 0.0
-    contact_velocities(world.mechanism, state.body, state.v, now, count)
-    mark_new(now, count, before, state.contact_count[1], world.coherence_distance, world.rigid)
-    if world.switches.supports:
-        count = state.contact_count[0] = leave_out_seams(world, state, count)
-    classify(world, state, count)
-    return count
-
-
-@kernel
-def present_contacts(world, state, contacts):
-    """Find, cluster and complete the contacts of the present configuration; return how many, -1:
-    too many."""
-    R, p, pairs = state.body.rotation, state.body.position, world.pairs
-    # all corners of a face that touches, whatever its rounding, or the bend of a rigid contact
-    margin = TOUCHING if world.switches.implicit_contact else 0.0
-    if world.rigid:
-        margin = CLOSE
-    if world.broad_phase.used:
-        near = near_pairs(world.broad_phase, R, p, margin)
-        if near < 0:
-            return -1
-        pairs = world.broad_phase.pairs[:near]
-    count = detect(world.shapes, pairs, R, p, margin, contacts)
-    for i in range(count):
-        contacts.gap[i] = min(contacts.gap[i], 0.0)
-    if world.switches.clustering:
-        count = cluster(world, contacts, count)
-    if world.switches.joint_limits and count >= 0:
-        count = add_stops(world, state, contacts, count)
-    return count
-
-
-@kernel
-def move(world, state, applied):
-    """Integrate (7) over Δt: forces, new velocity, new configuration."""
-    copy_into(state.start_v, state.v)
-    accelerate(world, state, applied)
-    add_multiple(state.v, world.dt, state.acceleration)
-    touches = world.switches.contacts and world.switches.implicit_contact
-    implicit = touches or world.switches.joint_damping or world.switches.joint_friction
-    if implicit and not implicit_forces(world, state, touches):
-        return NOT_POSITIVE_DEFINITE
-    finite = True
-    for k in range(state.v.shape[0]):
-        finite = finite and abs(state.v[k]) < LARGEST_SPEED  # False for NaN too
-    if not finite:
-        return NOT_FINITE
-    if world.conserving:
-        return OK if drift(world, state, applied) else NOT_POSITIVE_DEFINITE
-    integrate(world.mechanism, state.q, state.v, world.dt, state.q)
-    return OK
-
-
-@kernel
-def implicit_forces(world, state, touches):
-    """Apply joint damping, joint friction and contact, from the state at the start of the step.
-    Return False if M is not definite."""
-    damped = world.switches.joint_damping
-    if damped and not damp_joints(world, state):
-        return False
-    if touches or world.switches.joint_friction:
-        rest_implicitly(world, state, touches, touches and world.switches.friction)
-        for k in range(state.v.shape[0] if damped else 0):
-            state.acceleration[k] = -world.joint_damping[k] * state.v[k]
-    if damped:
-        add_multiple(state.friction_force, 1.0, state.acceleration)
-    return True
-
-
-@kernel
-def drift(world, state, applied):
-    """Move all trees freely for Δt, then apply the second half of gravity to falling trees. False:
-    M not definite."""
-    m, free = world.mechanism, world.free
-    if not (free.turning and world.switches.velocity_terms):
-        integrate(m, state.q, state.v, world.dt, state.q)
-    else:
-        parts = 0
-        if free.linked:
-            parts = parts_of_linkages(m, free, world.tree_start, world.tree_stop, state.v, world.dt)
-            coriolis(world, state)
-        move_simple_trees(m, free, world.tree_of_body, state.q, state.v, world.dt)
-        for part in range(parts):
-            if part > 0:
-                coriolis(world, state)
-            if not swing(world, state, world.dt / parts):
-                return False
-    if world.switches.gravity:
-        pull_falling_trees(world, state, applied)
-    return True
-
-
-@kernel
-def coriolis(world, state):
-    """acceleration <- −M⁻¹ B at the present state."""
-    bias(world.mechanism, state.body, state.v, state.bias)
-    for k in range(state.v.shape[0]):
-        state.acceleration[k] = -state.bias[k]
-    solve_tree_blocks(
-        state.lower, world.tree_start, world.tree_stop, state.acceleration, state.acceleration
-    )
-
-
-@kernel
-def swing(world, state, h):
-    """Move the linkages by h [s]: velocity Verlet, then the root's momentum and the energy are
-    those before."""
-    m, free, a = world.mechanism, world.free, state.acceleration
-    for t in range(free.kind.shape[0]):
-        if free.kind[t] == LINKAGE:
-            start, stop = world.tree_start[t], world.tree_stop[t]
-            p = state.root_momentum[t]
-            state.tree_energy[t] = base_momentum(
-                m, free, state.body, state.q, state.mass_matrix, start, stop, t, state.v, p
-            )
-            if free.base[t] > 0 and m.kind[free.root[t]] != SPHERICAL:
-                center, mass = center_of(m, state.body, world.tree_of_body, t)
-                path = scale(
-                    h / mass if mass > 0.0 else 0.0, linear_momentum(m, free, state.body, t, p)
-                )
-                p[6], p[7], p[8] = add(center, path)
-    for b in range(m.kind.shape[0]):
-        if free.kind[world.tree_of_body[b]] == LINKAGE:
-            start, stop = m.v_start[b], m.v_start[b] + m.v_count[b]
-            add_multiple(state.v[start:stop], 0.5 * h, a[start:stop])
-            integrate_body(m, b, state.q, state.v, h, state.q)
-            add_multiple(state.v[start:stop], 0.5 * h, a[start:stop])
-    if not locate(world, state):
-        return False
-    for t in range(free.kind.shape[0]):
-        if free.base[t] > 0 and m.kind[free.root[t]] != SPHERICAL:
-            p = state.root_momentum[t]
-            center, _ = center_of(m, state.body, world.tree_of_body, t)
-            shift_root(
-                m,
-                free,
-                state.body,
-                world.tree_of_body,
-                state.q,
-                t,
-                subtract((p[6], p[7], p[8]), center),
-            )
-    copy_into(state.located_q, state.q)
-    copy_into(state.body.placed_q[: state.q.shape[0]], state.q)
-    copy_into(state.acceleration_before, a)
-    coriolis(world, state)
-    for t in range(free.kind.shape[0]):
-        if free.kind[t] == LINKAGE:
-            start, stop = world.tree_start[t], world.tree_stop[t]
-            for k in range(start, stop):
-                state.v[k] += 0.5 * h * (a[k] - state.acceleration_before[k])
-            p = state.root_momentum[t]
-            to_fixed_axes(m, free, state.body, state.q, t, p, -1.0)
-            keep_momentum_and_energy(
-                state.mass_matrix,
-                state.lower,
-                start,
-                stop,
-                free.base[t],
-                p,
-                state.tree_energy[t],
-                state.v,
-                state.bias,
-            )
-    return True
-
-
-@kernel
-def falls(world, state, applied, t):
-    """Return whether tree t is free of contact and joint friction and, with implicit contact, of
-    the hand and the coupling.
-
-    Only where gravity acts alone is it split in halves: a force that holds a weight would move it
-    by half a step.
-    """
-    alone = state.state_of_tree[t] == FREE
-    for k in range(
-        world.tree_start[t], world.tree_stop[t] if world.switches.implicit_contact else 0
-    ):
-        alone = alone and applied[k] == 0.0
-    return alone and not (world.switches.joint_friction and is_dry(world, t))
-
-
-@kernel
-def pull_falling_trees(world, state, applied):
-    """Add half a step of gravity to the velocity of falling trees; the other half acted before they
-    moved."""
-    some = False
-    for t in range(world.tree_start.shape[0]):
-        some = some or falls(world, state, applied, t)
-    if not some:
-        return
-    forward_kinematics(world.mechanism, state.q, state.body)
-    gravity(world.mechanism, state.body, world.gravity, state.bias)
-    solve_tree_blocks(state.lower, world.tree_start, world.tree_stop, state.bias, state.bias)
-    add_to_falling_trees(world, state, applied, state.v, -0.5 * world.dt)
-
-
-@kernel
-def add_to_falling_trees(world, state, applied, vector, factor):
-    """Do vector += factor · `bias` for the falling trees."""
-    for t in range(world.tree_start.shape[0]):
-        if falls(world, state, applied, t):
-            start, stop = world.tree_start[t], world.tree_stop[t]
-            add_multiple(vector[start:stop], factor, state.bias[start:stop])
-
-
-@kernel
-def damp_joints(world, state):
-    """Solve (M + Δt D) v⁺ = M v for damped trees, D diagonal; −D v⁺ into `acceleration`. False: not
-    definite.
-
-    v⁺ minimizes ½|v⁺ − v|²_M + ½ Δt v⁺ᵀ D v⁺, so that ½|v⁺|²_M ≤ ½|v|²_M for every D ≥ 0 and every
-    Δt: the step is passive, and the loss is Δt v⁺ᵀ D v⁺ + ½|v⁺ − v|²_M.
-    """
-    a, mass, lower = state.acceleration, state.work.mass, state.work.lower
-    for t in range(world.tree_start.shape[0]):
-        start, stop, damped = world.tree_start[t], world.tree_stop[t], False
-        for k in range(start, stop):
-            a[k] = 0.0
-            damped = damped or world.joint_damping[k] > 0.0
-        if not damped:
-            continue
-        for i in range(start, stop):
-            for j in range(start, stop):
-                mass[i, j] = state.mass_matrix[i, j]
-                a[i] += state.mass_matrix[i, j] * state.v[j]
-            mass[i, i] += world.dt * world.joint_damping[i]
-        if cholesky(mass[start:stop, start:stop], lower[start:stop, start:stop]) != 0:
-            return False
-        solve_mass(lower[start:stop, start:stop], a[start:stop], a[start:stop])
-        for k in range(start, stop):
-            state.v[k] = a[k]
-            a[k] *= -world.joint_damping[k]
-    return True
-
-
-@kernel
-def accelerate(world, state, applied):
-    """Solve (7), M a = applied + penalty + friction − B − G.
-
-    The forces (4)-(6) act at the contacts of groups that do not collide; in a collision the impulse
-    acts.
-    """
-    a, contacts = state.acceleration, state.contacts
-    if not world.switches.implicit_contact:
-        for i in range(state.contact_count[0]):
-            contacts.normal_force[i] = 0.0
-            store(contacts.friction_force, i, (0.0, 0.0, 0.0))
-            if (
-                state.state_of_tree[group_of_contact(world, contacts, i, state.group_of_tree)]
-                != COLLIDING
-            ):
-                resting_force(world, state, contacts, i)
-    for k in range(a.shape[0]):
-        a[k] = applied[k] + state.penalty_force[k] + state.friction_force[k]
-    if world.switches.gravity:
-        gravity(world.mechanism, state.body, world.gravity, state.bias)
-        add_multiple(a, -1.0, state.bias)
-        if world.conserving:
-            add_to_falling_trees(world, state, applied, a, 0.5)
-    if world.switches.velocity_terms and not world.conserving:
-        bias(world.mechanism, state.body, state.v, state.bias)
-        add_multiple(a, -1.0, state.bias)
-    solve_tree_blocks(state.lower, world.tree_start, world.tree_stop, a, a)

@@ -15,7 +15,7 @@ from iapb.contact.kernels.implicit import RestWork
 from iapb.contact.kernels.unilateral import PushWork, ShareWork
 from iapb.mechanics.kernels.arrays import MechanismArrays, Workspace
 from iapb.mechanics.kernels.free_motion import FreeMotion
-from iapb.schema import Booleans, Floats, Integers, States
+from iapb.schema import Booleans, Floats, Indices, Integers, States
 
 
 class Switches(NamedTuple):
@@ -33,6 +33,7 @@ class Switches(NamedTuple):
     clustering: bool
     # a contact that strikes may have others beside it, which carry a load or have another e
     supports: bool
+    touch: bool  # impacts happen at the moment of touch; else at the start of the next step
     impulse_limit: bool
     spreading: bool
     contacts: bool
@@ -55,6 +56,16 @@ class Stops(NamedTuple):
     arm: np.ndarray  # (k,) [m]
 
 
+class Sweep(NamedTuple):
+    """What the search for touches within a step knows of n shapes."""
+
+    middle: np.ndarray  # (n, 3) [m] centre of a bounding sphere, in the body's frame
+    radius: np.ndarray  # (n,) [m] its radius; infinite for half-planes and half-spaces
+    thin: np.ndarray  # (n,) [m] smallest extent
+    thinnest: float  # [m] smallest of these
+    lever: float  # no point moves faster than this times the largest entry of v; infinite: unknown
+
+
 class World(NamedTuple):
     """A scene under one contact law, as input of the step (n bodies, d velocities, t trees)."""
 
@@ -62,9 +73,12 @@ class World(NamedTuple):
     shapes: Shapes
     pairs: np.ndarray  # (k, 2) candidate pairs of shapes
     broad_phase: BroadPhase  # finds the near pairs among them
+    sweep: Sweep
     tree_of_body: np.ndarray  # (n,) int64
     tree_start: np.ndarray  # (t,) first dof of each tree
     tree_stop: np.ndarray  # (t,)
+    tree_of_coordinate: np.ndarray  # (nq,) int64
+    tree_of_dof: np.ndarray  # (d,) int64
     tree_mass: np.ndarray  # (t,) mass of its bodies [kg]
     switches: Switches
     dt: float  # [s]
@@ -93,6 +107,38 @@ class World(NamedTuple):
     free: FreeMotion
 
 
+class Cut(NamedTuple):
+    """Scratch of a step that is cut: its start, after the impacts there, and its end."""
+
+    arriving: Annotated[Integers, "1"]  # contacts at the end of the step in `State.arriving`, or −1
+    elapsed: Annotated[Floats, "1"]  # [s] since the start of the step
+    q: Annotated[Floats, "coordinate"]
+    v: Annotated[Floats, "velocity"]
+    impulse: Annotated[Floats, "velocity"]
+    contact_impulse: Annotated[Floats, "row"]
+    numbers: Annotated[Integers, "3"]  # contacts, contacts before, impacts logged
+    contacts: ContactBuffer
+    previous: ContactBuffer
+    group: Annotated[Integers, "tree"]
+    state: Annotated[States, "tree"]
+    spreading: Annotated[Booleans, "tree"]
+    rests: Annotated[Booleans, "tree"]
+    struck: Annotated[Booleans, "tree"]  # in some part of the step
+    end_q: Annotated[Floats, "coordinate"]
+    end_v: Annotated[Floats, "velocity"]
+    end_penalty: Annotated[Floats, "velocity"]  # [N, N m] mean over the step
+    end_friction: Annotated[Floats, "velocity"]
+    part_q: Annotated[Floats, "coordinate"]  # the start of the present part
+    part_v: Annotated[Floats, "velocity"]
+    penalty: Annotated[Floats, "velocity"]  # [N s, N m s] of the parts so far
+    friction: Annotated[Floats, "velocity"]
+    component: Annotated[Integers, "tree"]  # first tree of those that are cut together
+    touches: Annotated[Booleans, "tree"]  # the first tree of a component with new contacts
+    pairs: Annotated[Indices, "contact 2"]  # pairs of shapes that have come to overlap
+    fast: Annotated[Indices, "contact"]  # candidate pairs that may pass through each other
+    fast_count: Annotated[Integers, "1"]
+
+
 class State(NamedTuple):
     """Everything that changes from step to step, and the scratch of the step; `iapb.system` makes
     it from the fields.
@@ -108,6 +154,11 @@ class State(NamedTuple):
     contacts: ContactBuffer  # of this step
     previous: ContactBuffer  # of the step before
     scratch_contacts: ContactBuffer  # of another velocity or configuration
+    arriving: ContactBuffer  # at the end of the step, or of a part of it
+    h: Annotated[Floats, "1"]  # [s] length of the step, or of the part of it that is computed
+    moving: Annotated[Booleans, "tree"]  # takes part in this part of the step
+    rests: Annotated[Booleans, "tree"]  # a contact may hold it: it does not fall freely
+    cut: Cut  # of a step that is cut at touches
     contact_count: Annotated[Integers, "2"]  # contacts now, contacts in the step before
     group_of_tree: Annotated[Integers, "tree"]  # first tree of its contact group
     state_of_tree: Annotated[States, "tree"]  # FREE, COLLIDING, RESTING

@@ -83,6 +83,12 @@ SWITCHES: dict[str, tuple[Scene, dict[str, Any], dict[str, Any], str]] = {
         {"contact.forces": "paper"},
         "= implicit",
     ),
+    "touch": (
+        PEG,
+        {"contact.forces": "implicit"},
+        {"contact.forces": "implicit", "contact.impact_time": "step"},
+        "= touch",
+    ),
     "supports": (
         PEG,
         {"contact.forces": "implicit"},

@@ -116,6 +116,7 @@ ONLY = {
     "friction": "friction_share",
     "implicit_contact": "rest_implicitly",
     "supports": "leave_out_seams",
+    "touch": "let_go cut_at_touch contacts_at_end find_fast_pairs",
     "clustering": "cluster",
     "coherence": "same_surface squared_distance",
     "wall_contacts": "find_contacts detect contact_velocities resting_force",

@@ -204,7 +204,7 @@ CASES: dict[str, tuple[Scene, Any]] = {
         ImpulseAugmented(),
     ),
     "plane, implicit, friction": (
-        pit(False, forces="implicit", friction=0.4, damping=50, restitution=0),
+        pit(False, forces="implicit", impact_time="step", friction=0.4, damping=50, restitution=0),
         ImpulseAugmented(),
     ),
     "plane, penalties": (pit(False, friction=0.3), Penalty()),
@@ -217,13 +217,16 @@ CASES: dict[str, tuple[Scene, Any]] = {
     ),
     "space": (pit(True, friction=0.4), ImpulseAugmented()),
     "space, implicit": (
-        pit(True, forces="implicit", friction=0.4, restitution=0),
+        pit(True, forces="implicit", impact_time="step", friction=0.4, restitution=0),
         ImpulseAugmented(),
     ),
     "space, unequal": (each_its_own(pit(True), "restitution"), ImpulseAugmented()),
     "space, impact friction": (pit(True, friction=0.3), ImpulseAugmented(friction_in_impacts=True)),
     "arm": (swinging(friction=0.3), ImpulseAugmented()),
-    "arm, implicit": (swinging(forces="implicit", friction=0.3, restitution=0), ImpulseAugmented()),
+    "arm, implicit": (
+        swinging(forces="implicit", impact_time="step", friction=0.3, restitution=0),
+        ImpulseAugmented(),
+    ),
     "arm and block": (shipped("arm_pushing", duration=0.6), ImpulseAugmented()),
     "cradle": (shipped("newton_cradle", duration=0.1), ImpulseAugmented()),
     "cradle that touches": (touching_row(), ImpulseAugmented()),

@@ -124,6 +124,7 @@ IN_THE_PLANE: dict[str, list[Any]] = {
     "contact.penalty": ["soft", None, True],
     "contact.restitution": [*NEGATIVE, 1.001],
     "contact.self_collision_rows": ["both", None],
+    "contact.impact_time": ["now", None],
     "hand.body": [*NOT_A_NAME, "nobody", "floor", "foot"],
     "hand.force": [[1.0, 2.0], 3.0, None, [math.nan, 0.0, 0.0]],
     "hand.force_table": [1.0, [1.0], [[0.0, 1.0]], [[0.0, 1.0, 1.0, "x"]], [[0.0] * 4, [0.0] * 4]],

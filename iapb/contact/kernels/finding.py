@@ -1,0 +1,149 @@
+"""The contacts of the present configuration (paper section III): found, clustered, marked and
+grouped."""
+
+from __future__ import annotations
+
+from iapb.compiled import kernel
+from iapb.contact.kernels.broadphase import near_pairs
+from iapb.contact.kernels.contact_set import (
+    CLOSE,
+    TOUCHING,
+    classify,
+    cluster,
+    mark_new,
+    same_name,
+)
+from iapb.contact.kernels.joint_stops import add_stops
+from iapb.contact.kernels.narrow_phase import detect
+from iapb.contact.kernels.rows import contact_velocities
+from iapb.contact.kernels.seams import leave_out_seams
+from iapb.contact.kernels.shape_frames import copy_contact, copy_found
+from iapb.linalg import load, store
+
+# share of what a contact bent off its support in a step by which the next step may differ
+BENDS = 0.5
+
+
+@kernel
+def find_contacts(world, state):
+    """Find the contacts at the start of a step and classify groups; return how many, -1: too many.
+
+    Those found at the end of the step before are taken, unless somebody has moved the bodies since.
+    """
+    now, before = state.contacts, state.previous
+    for i in range(
+        state.contact_count[0]
+    ):  # `mark_new` and friction compare with those of the last step
+        copy_contact(before, i, now, i)
+        before.normal_force[i], before.expected[i] = now.normal_force[i], now.expected[i]
+        before.sticks[i], before.span[i] = now.sticks[i], now.span[i]
+        if world.switches.implicit_contact and world.switches.friction:
+            store(before.point_a, i, load(now.point_a, i))
+            store(before.point_b, i, load(now.point_b, i))
+            store(before.slid, i, load(now.slid, i))
+            store(before.rolled, i, load(now.rolled, i))
+            store(before.drift, i, load(now.drift, i))
+    state.contact_count[1] = state.contact_count[0]
+    if world.switches.touch and known_at_end(state):
+        count = state.cut.arriving[0]
+        for i in range(count):
+            copy_found(now, i, state.arriving, i)
+    else:
+        count = present_contacts(world, state, now, before, state.contact_count[1])
+    if count < 0:
+        return count
+    state.contact_count[0] = count
+    state.contact_impulse[:count] = 0.0
+    classify(world, state, count)
+    return count
+
+
+@kernel
+def known_at_end(state):
+    """Return whether `arriving` holds the contacts of the present q and v."""
+    known = state.cut.arriving[0] >= 0
+    for i in range(state.q.shape[0]):
+        known = known and state.q[i] == state.cut.end_q[i]
+    for k in range(state.v.shape[0]):
+        known = known and state.v[k] == state.cut.end_v[k]
+    return known
+
+
+@kernel
+def present_contacts(world, state, contacts, before, count_before):
+    """Write the contacts of the present configuration, new ones marked, with their velocities;
+    return how many, -1: too many.
+
+    before : those of the step before, or of the part of a step before.
+    """
+    count = detect_contacts(world, state, contacts, before, count_before)
+    if count >= 0:
+        contact_velocities(world.mechanism, state.body, state.v, contacts, count)
+        mark_new(contacts, count, before, count_before, world.coherence_distance, world.rigid)
+        contacts.idle[:count] = False
+        contacts.lift[:count] = 0.0
+        if world.switches.supports:
+            count = leave_out_seams(world, state, contacts, count)
+    return count
+
+
+@kernel
+def detect_contacts(world, state, contacts, before, count_before):
+    """Find, cluster and complete the contacts of the present configuration; return how many, -1:
+    too many."""
+    R, p, pairs = state.body.rotation, state.body.position, world.pairs
+    # all corners of a face that touches, whatever its rounding, or the bend of a rigid contact
+    margin = TOUCHING if world.switches.implicit_contact else 0.0
+    if world.rigid:
+        margin = CLOSE
+        for i in range(count_before):
+            margin = max(margin, may_lift(before, i))
+    if world.broad_phase.used:
+        near = near_pairs(world.broad_phase, R, p, margin)
+        if near < 0:
+            return -1
+        pairs = world.broad_phase.pairs[:near]
+    count = detect(world.shapes, pairs, R, p, margin, contacts)
+    if margin > CLOSE:
+        count = leave_out_apart(contacts, count, before, count_before)
+    else:
+        for i in range(count):
+            contacts.gap[i] = min(contacts.gap[i], 0.0)
+    if world.switches.clustering:
+        count = cluster(world, contacts, count)
+    if world.switches.joint_limits and count >= 0:
+        margin, first = CLOSE if world.switches.touch else 0.0, count
+        count = add_stops(world, state, contacts, first, margin)
+        for i in range(first, count):
+            contacts.gap[i] = min(contacts.gap[i], 0.0)
+    return count
+
+
+@kernel
+def may_lift(before, i):
+    """Return the gap [m] up to which contact i of the step before still counts as closed.
+
+    A corner about which a body turns lifts on its arc. The step allows for the arc of the step
+    before; what is left is a small share of it.
+    """
+    if before.normal_force[i] <= 0.0:
+        return 0.0
+    return CLOSE + BENDS * abs(before.expected[i] - before.gap[i])
+
+
+@kernel
+def leave_out_apart(contacts, count, before, count_before):
+    """Drop contacts that are apart, and keep the gap of those that only bend off their support;
+    return how many stay."""
+    kept = 0
+    for i in range(count):
+        allowed, gap = 0.0, contacts.gap[i]
+        for k in range(count_before if gap > 0.0 else 0):
+            if same_name(contacts, i, before, k):
+                allowed = may_lift(before, k)
+        if gap <= max(allowed, CLOSE):
+            if kept < i:
+                copy_contact(contacts, kept, contacts, i)
+            contacts.gap[kept] = gap if allowed > CLOSE else min(gap, 0.0)
+            kept += 1
+    return kept

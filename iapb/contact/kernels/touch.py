@@ -1,0 +1,652 @@
+"""Impacts at the moment of touch: a step is cut where bodies meet (the effect `touch`).
+
+At the end of a step the engine looks for new contacts. Where some have come up, it takes the step of
+the bodies involved back, and does it in parts:
+
+1. All bodies have moved freely for a step. New contacts that overlap now link their groups to
+   components; every other group keeps its step.
+2. A component moves again from the start of the step, until the first new contact touches: the gap
+   is zero there, found by Newton's method along the motion of the step, within a bracket.
+3. The impact is resolved there. Contacts within CLOSE of touching collide together, as (15) says.
+   What an impact has separated flies on freely.
+4. The component moves on for the rest of the step, and so on with what it touches next.
+5. After MOST impacts, contacts that have struck hold for the rest of the step: a ball comes to rest.
+   What still overlaps at the end strikes at the start of the next step.
+
+A component that reaches another tree in the rest of the step is joined with it, and both start again.
+Each impact is passive, and so is each part of the motion; so the step is passive.
+"""
+
+from __future__ import annotations
+
+import math
+
+from iapb.compiled import copy_into, kernel
+from iapb.contact.kernels.collide import resolve_collisions
+from iapb.contact.kernels.contact_set import (
+    CLOSE,
+    LEFT,
+    TOUCHING,
+    classify,
+    contact_before,
+    group_of_contact,
+    mark_new,
+    same_name,
+)
+from iapb.contact.kernels.finding import present_contacts
+from iapb.contact.kernels.joint_stops import add_stops, is_stop
+from iapb.contact.kernels.motion import NOT_POSITIVE_DEFINITE, OK, TOO_MANY_CONTACTS, locate, move
+from iapb.contact.kernels.narrow_phase import detect
+from iapb.contact.kernels.rows import contact_velocities, twist
+from iapb.contact.kernels.shape_frames import copy_all, copy_contact, copy_found
+from iapb.linalg import add, add_multiple, dot, load, store, subtract, transform
+from iapb.mechanics.kernels.kinematics import forward_kinematics
+from iapb.run import COLLIDING
+
+MOST = 8  # parts after which a component is cut no more in this step
+SAG = 0.01  # share of the deepest overlap of a group: a new overlap below it is no touch to find
+MOST_SAMPLES = 64.0  # moments of a step at which fast bodies are looked at
+SEARCHES = 16  # motions tried to find a touch; every fourth one halves the bracket
+MET = -1  # status: the component reaches a tree outside, and both are cut together
+
+
+@kernel
+def cut_at_touch(world, state, applied):
+    """Do the step again in parts where it has brought new contacts; return a status."""
+    cut = state.cut
+    count = contacts_at_end(world, state)
+    if count >= 0 and gather_components(world, state, count):
+        status = MET
+        keep_start(state)
+        while status == MET:  # each time, two components have become one
+            status = OK
+            back_to_start(state)
+            for t in range(cut.component.shape[0]):
+                if status == OK and cut.component[t] == t and cut.touches[t]:
+                    status = cut_component(world, state, applied, t)
+        end_step(world, state)
+        if status != OK:
+            return status
+        count = contacts_at_end(world, state)
+    if count < 0:
+        return TOO_MANY_CONTACTS
+    cut.arriving[0] = count
+    copy_into(cut.end_q, state.q)
+    copy_into(cut.end_v, state.v)
+    return OK
+
+
+@kernel
+def contacts_at_end(world, state):
+    """Write the contacts of the present q and v to `arriving`; return how many, -1: too many."""
+    forward_kinematics(world.mechanism, state.q, state.body)
+    return present_contacts(world, state, state.arriving, state.contacts, state.contact_count[0])
+
+
+@kernel
+def arrives(world, state, i):
+    """Return whether contact i of `arriving` has come up in the motion: it is new and overlaps.
+
+    Two bodies that are in contact may show an old overlap under a new name: a seam, or another
+    edge. Its depth is more than its speed explains.
+    """
+    found = state.arriving
+    if not found.is_new[i] or found.gap[i] >= -max(CLOSE, SAG * deepest_of_groups(world, state, i)):
+        return False
+    if not met_before(state, i):
+        return True
+    speed = -found.normal_velocity[i]
+    return speed > world.approach_velocity and -found.gap[i] <= 4.0 * world.dt * speed + CLOSE
+
+
+@kernel
+def deepest_of_groups(world, state, i):
+    """Return the deepest overlap [m] in the groups of the two bodies of contact i of `arriving`."""
+    found, now, deepest = state.arriving, state.contacts, 0.0
+    one = state.group_of_tree[world.tree_of_body[found.body_a[i]]]
+    other = one
+    if found.body_b[i] >= 0:
+        other = state.group_of_tree[world.tree_of_body[found.body_b[i]]]
+    for k in range(state.contact_count[0]):
+        group = group_of_contact(world, now, k, state.group_of_tree)
+        if group in (one, other) and not now.idle[k]:
+            deepest = max(deepest, -now.gap[k])
+    return deepest
+
+
+@kernel
+def met_before(state, i):
+    """Return whether the two bodies of contact i of `arriving` have been in contact already."""
+    found, now = state.arriving, state.contacts
+    for k in range(state.contact_count[0]):
+        acts = now.gap[k] < -TOUCHING or now.normal_force[k] > 0.0
+        if (
+            acts
+            and not now.idle[k]
+            and now.body_a[k] == found.body_a[i]
+            and now.body_b[k] == found.body_b[i]
+        ):
+            return True
+    return False
+
+
+@kernel
+def gather_components(world, state, count):
+    """Write the components of groups that new contacts link; return whether there are any."""
+    cut, some = state.cut, False
+    for t in range(cut.component.shape[0]):
+        cut.component[t], cut.touches[t] = state.group_of_tree[t], False
+    for i in range(count):
+        if arrives(world, state, i):
+            link(world, state, state.arriving.body_a[i], state.arriving.body_b[i])
+            some = True
+    return find_fast_pairs(world, state) or some
+
+
+@kernel
+def find_fast_pairs(world, state):
+    """List pairs that may have passed through each other in the step, and link their bodies;
+    return whether there are any.
+
+    Their relative way exceeds half of the thinner one, and they are no farther apart than this way.
+    """
+    cut, sweep, shapes, count = state.cut, world.sweep, world.shapes, 0
+    cut.fast_count[0], quick, fastest = 0, False, 0.0
+    for k in range(state.v.shape[0]):
+        fastest = max(fastest, abs(state.v[k]))
+    if world.dt * fastest * sweep.lever <= 0.5 * sweep.thinnest:
+        return False
+    for i in range(shapes.kind.shape[0]):
+        quick = quick or way_of(world, state, i) > 0.5 * sweep.thinnest
+    for k in range(world.pairs.shape[0] if quick else 0):
+        a, b = world.pairs[k, 0], world.pairs[k, 1]
+        way = way_of(world, state, a) + way_of(world, state, b)
+        if not way > 0.5 * min(sweep.thin[a], sweep.thin[b]):
+            continue
+        apart = subtract(middle_of(world, state, a), middle_of(world, state, b))
+        near = sweep.radius[a] + sweep.radius[b] + way
+        if dot(apart, apart) <= near * near and count < cut.fast.shape[0]:
+            cut.fast[count] = k
+            count += 1
+            link(world, state, shapes.body[a], shapes.body[b])
+    cut.fast_count[0] = count
+    return count > 0
+
+
+@kernel
+def middle_of(world, state, i):
+    """Return the middle of shape i in the world."""
+    body, middle = world.shapes.body[i], load(world.sweep.middle, i)
+    if body < 0:
+        return middle
+    return add(load(state.body.position, body), transform(state.body.rotation, body, middle))
+
+
+@kernel
+def way_of(world, state, i):
+    """Return a bound of how far a point of shape i moves in a step at its present velocity [m]."""
+    body = world.shapes.body[i]
+    if body < 0 or world.sweep.radius[i] == math.inf:
+        return 0.0
+    p, u, omega = twist(world.mechanism, state.body, body, state.v)
+    arm = subtract(middle_of(world, state, i), p)
+    reach = math.sqrt(dot(arm, arm)) + world.sweep.radius[i]
+    return world.dt * (math.sqrt(dot(u, u)) + math.sqrt(dot(omega, omega)) * reach)
+
+
+@kernel
+def link(world, state, body, other):
+    """Join the components of two bodies, the second −1 for the world; they are to be cut."""
+    cut = state.cut
+    a = cut.component[world.tree_of_body[body]]
+    b = a if other < 0 else cut.component[world.tree_of_body[other]]
+    for t in range(cut.component.shape[0]):
+        if cut.component[t] == max(a, b):
+            cut.component[t] = min(a, b)
+    cut.touches[min(a, b)] = True
+
+
+@kernel
+def keep_start(state):
+    """Keep the start of the step, after its impacts, and the end of the whole step."""
+    cut, counts = state.cut, state.contact_count
+    copy_into(cut.v, state.start_v)
+    copy_into(cut.impulse, state.impulse)
+    copy_into(cut.contact_impulse, state.contact_impulse)
+    copy_into(cut.group, state.group_of_tree)
+    copy_into(cut.state, state.state_of_tree)
+    copy_into(cut.spreading, state.spreading)
+    copy_into(cut.rests, state.rests)
+    copy_into(cut.end_q, state.q)
+    copy_into(cut.end_v, state.v)
+    copy_into(cut.end_penalty, state.penalty_force)
+    copy_into(cut.end_friction, state.friction_force)
+    cut.numbers[0], cut.numbers[1], cut.numbers[2] = counts[0], counts[1], state.impacts.logged[0]
+    for i in range(counts[0]):
+        copy_all(cut.contacts, i, state.contacts, i)
+    for i in range(counts[1]):
+        copy_all(cut.previous, i, state.previous, i)
+
+
+@kernel
+def back_to_start(state):
+    """Take back what parts of the step have changed, but for q and v."""
+    cut = state.cut
+    copy_into(state.impulse, cut.impulse)
+    copy_into(state.contact_impulse, cut.contact_impulse)
+    copy_into(state.group_of_tree, cut.group)
+    copy_into(state.state_of_tree, cut.state)
+    copy_into(state.spreading, cut.spreading)
+    copy_into(state.rests, cut.rests)
+    state.contact_count[0], state.impacts.logged[0] = cut.numbers[0], cut.numbers[2]
+    for t in range(cut.struck.shape[0]):
+        cut.struck[t] = state.state_of_tree[t] == COLLIDING
+    for i in range(cut.numbers[0]):
+        copy_all(state.contacts, i, cut.contacts, i)
+
+
+@kernel
+def cut_component(world, state, applied, root):
+    """Do the step of one component in parts; return a status."""
+    cut, left, parts = state.cut, world.dt, 0
+    size = begin_component(world, state, root)
+    while True:
+        status = move_part(world, state, applied, left)
+        if status != OK:
+            return status
+        some, outside = reached(world, state)
+        if outside:
+            return MET
+        full = state.impacts.logged[0] + size > state.impacts.group.shape[0]
+        if parts == MOST or full:  # what is left strikes in the next step
+            break
+        end = left
+        if cut.fast_count[0] > 0:
+            end, status = move_to_overlap(world, state, applied, left)
+            if status != OK:
+                return status
+        if not some and end == left:
+            break
+        h, status = move_to_touch(world, state, applied, end)
+        if status != OK:
+            return status
+        add_part(state, h)
+        left -= h
+        cut.elapsed[0] += h
+        parts += 1
+        if not take_contacts(world, state):
+            return TOO_MANY_CONTACTS
+        if not strike(world, state, parts < MOST):
+            return NOT_POSITIVE_DEFINITE
+        copy_into(cut.part_q, state.q)
+        copy_into(cut.part_v, state.v)
+    if parts > 0 and lifts(world, state):
+        status = move_part(world, state, applied, left)
+        if status != OK:
+            return status
+    add_part(state, left)
+    for i in range(state.q.shape[0]):
+        cut.end_q[i] = state.q[i]
+    for k in range(state.v.shape[0]):
+        cut.end_v[k] = state.v[k]
+        if state.moving[world.tree_of_dof[k]]:
+            cut.end_penalty[k] = cut.penalty[k] / world.dt
+            cut.end_friction[k] = cut.friction[k] / world.dt
+    return OK
+
+
+@kernel
+def begin_component(world, state, root):
+    """Choose the trees that move and the contacts that take part; return the number of trees."""
+    cut, size = state.cut, 0
+    for t in range(state.moving.shape[0]):
+        state.moving[t] = cut.component[t] == root
+        size += state.moving[t]
+    for i in range(state.contact_count[0]):
+        state.contacts.idle[i] = not takes_part(world, state, state.contacts, i)
+    state.contact_count[1] = cut.numbers[1]
+    for i in range(cut.numbers[1]):
+        copy_all(state.previous, i, cut.previous, i)
+    copy_into(cut.part_q, cut.q)
+    copy_into(cut.part_v, cut.v)
+    cut.elapsed[0] = 0.0
+    cut.penalty[:] = cut.friction[:] = 0.0
+    return size
+
+
+@kernel
+def takes_part(world, state, contacts, i):
+    """Return whether both bodies of a contact move now; the world takes part in everything."""
+    a, b = world.tree_of_body[contacts.body_a[i]], contacts.body_b[i]
+    return state.moving[a] and (b < 0 or state.moving[world.tree_of_body[b]])
+
+
+@kernel
+def move_part(world, state, applied, h):
+    """Move the component from the start of the part by h [s]; all others are at the end of the
+    step. Return a status."""
+    cut = state.cut
+    for i in range(state.q.shape[0]):
+        moves = state.moving[world.tree_of_coordinate[i]]
+        state.q[i] = cut.part_q[i] if moves else cut.end_q[i]
+    for k in range(state.v.shape[0]):
+        state.v[k] = cut.part_v[k] if state.moving[world.tree_of_dof[k]] else cut.end_v[k]
+        state.penalty_force[k] = state.friction_force[k] = 0.0
+    if not locate(world, state):
+        return NOT_POSITIVE_DEFINITE
+    state.h[0] = h
+    status = move(world, state, applied)
+    state.h[0] = world.dt
+    for i in range(state.q.shape[0]):
+        if not state.moving[world.tree_of_coordinate[i]]:
+            state.q[i] = cut.end_q[i]
+    for k in range(state.v.shape[0]):
+        if not state.moving[world.tree_of_dof[k]]:
+            state.v[k] = cut.end_v[k]
+    return status
+
+
+@kernel
+def reached(world, state):
+    """Return whether the component has new contacts at the end of the step, and whether with a tree
+    outside, which then is linked to it."""
+    some, found, count = False, state.arriving, contacts_at_end(world, state)
+    for i in range(count):
+        b = found.body_b[i]
+        inside = state.moving[world.tree_of_body[found.body_a[i]]]
+        other = inside if b < 0 else state.moving[world.tree_of_body[b]]
+        if (inside or other) and arrives(world, state, i):
+            some = True
+            if inside != other:
+                link(world, state, found.body_a[i], b)
+                return True, True
+    return some, False
+
+
+@kernel
+def move_to_overlap(world, state, applied, left):
+    """Move the component to the first moment of the `left` seconds that finds a fast pair in
+    overlap, or to their end; return the moment and a status."""
+    cut, samples, status = state.cut, 1.0, OK
+    for j in range(cut.fast_count[0]):
+        a, b = world.pairs[cut.fast[j], 0], world.pairs[cut.fast[j], 1]
+        if state.moving[world.tree_of_body[world.shapes.body[a]]]:
+            way = way_of(world, state, a) + way_of(world, state, b)
+            thin = min(world.sweep.thin[a], world.sweep.thin[b])
+            samples = max(samples, math.ceil(left / world.dt * way / (0.5 * thin)))
+    samples = min(samples, MOST_SAMPLES)
+    for n in range(1, int(samples)):
+        h = left * (n / samples)
+        status = move_part(world, state, applied, h)
+        if status != OK:
+            return h, status
+        forward_kinematics(world.mechanism, state.q, state.body)
+        for j in range(cut.fast_count[0]):
+            a, b = world.pairs[cut.fast[j], 0], world.pairs[cut.fast[j], 1]
+            if state.moving[world.tree_of_body[world.shapes.body[a]]]:
+                cut.pairs[0, 0], cut.pairs[0, 1] = a, b
+                if overlaps_now(world, state):
+                    return h, OK
+    return left, move_part(world, state, applied, left)
+
+
+@kernel
+def overlaps_now(world, state):
+    """Return whether a new contact of the first of the listed pairs overlaps."""
+    found, count, overlaps = state.arriving, gaps_of_pairs(world, state, 1), False
+    velocities_and_marks(world, state, count)
+    for i in range(count):
+        overlaps = overlaps or found.gap[i] < -CLOSE and found.is_new[i]
+    return overlaps
+
+
+@kernel
+def velocities_and_marks(world, state, count):
+    """Complete the contacts of `arriving`: their velocities, and whether they are new."""
+    contact_velocities(world.mechanism, state.body, state.v, state.arriving, count)
+    mark_new(
+        state.arriving,
+        count,
+        state.contacts,
+        state.contact_count[0],
+        world.coherence_distance,
+        world.rigid,
+    )
+
+
+@kernel
+def move_to_touch(world, state, applied, left):
+    """Move the component to its first touch in the `left` seconds at whose end bodies overlap;
+    return after how long it comes, and a status."""
+    pairs, stops = pairs_that_touch(world, state)
+    low, high = 0.0, left
+    _, _, guess = next_touch(world, state, pairs, stops, left)
+    for turn in range(SEARCHES):
+        if turn % 4 == 3 or not low < guess < high:
+            guess = 0.5 * (low + high)
+        h = guess
+        if not low < h < high:
+            break
+        status = move_part(world, state, applied, h)
+        if status != OK:
+            return h, status
+        overlaps, touches, guess = next_touch(world, state, pairs, stops, h)
+        if overlaps:
+            high = h
+        elif touches:
+            return h, OK
+        else:
+            low = h
+    return high, move_part(world, state, applied, high)
+
+
+@kernel
+def pairs_that_touch(world, state):
+    """Write the pairs of shapes of new contacts that take part; return their number, and whether
+    ends of joints are among them."""
+    found, pairs, count, stops = state.arriving, state.cut.pairs, 0, False
+    for i in range(contacts_at_end(world, state)):
+        if not (takes_part(world, state, found, i) and arrives(world, state, i)):
+            continue
+        if is_stop(found, i):
+            stops = True
+            continue
+        known = False
+        for k in range(count):
+            known = known or pairs[k, 0] == found.shape_a[i] and pairs[k, 1] == found.shape_b[i]
+        if not known:
+            pairs[count, 0], pairs[count, 1] = found.shape_a[i], found.shape_b[i]
+            count += 1
+    return count, stops
+
+
+@kernel
+def next_touch(world, state, pairs, stops, h):
+    """Look at the gaps of some pairs after h seconds; return whether one overlaps, whether one just
+    touches, and when the first touch is by Newton's method.
+
+    Contacts of bodies that are in contact already count as apart down to an overlap of CLOSE.
+    """
+    found = state.arriving
+    count = gaps_of_pairs(world, state, pairs)
+    if stops:
+        count = add_stops(world, state, found, count, math.inf)
+    velocities_and_marks(world, state, count)
+    overlaps, touches, earlier, later = False, False, math.inf, math.inf
+    for i in range(count):
+        if not found.is_new[i] or not takes_part(world, state, found, i):
+            continue
+        gap, speed = found.gap[i], found.normal_velocity[i]
+        if met_before(state, i):
+            gap += CLOSE
+        x, y, z = load(found.point, i)
+        rounded = TOUCHING * (1.0 + abs(x) + abs(y) + abs(z))
+        when = h - gap / speed if speed < 0.0 else math.inf
+        if gap < -rounded:
+            overlaps, earlier = True, min(earlier, when)
+        else:
+            touches, later = touches or gap <= rounded and speed < 0.0, min(later, when)
+    return overlaps, touches, earlier if overlaps else later
+
+
+@kernel
+def lifts(world, state):
+    """Write to contacts that hold for the first time how far they lift; return whether any does.
+
+    A corner about which a body turns moves off its support on its arc. The step before would show
+    how far, but there was no contact.
+    """
+    now, found, some = state.contacts, state.arriving, False
+    for i in range(state.contact_count[0]):
+        if now.idle[i] or now.mark[i] == LEFT or now.normal_force[i] <= 0.0 or is_stop(now, i):
+            continue
+        before = contact_before(state, i, 0)
+        if before >= 0 and state.previous.normal_force[before] > 0.0:
+            continue
+        state.cut.pairs[0, 0], state.cut.pairs[0, 1] = now.shape_a[i], now.shape_b[i]
+        count = gaps_of_pairs(world, state, 1)
+        for k in range(count):
+            if same_name(found, k, now, i) and found.gap[k] > CLOSE:
+                now.lift[i], some = found.gap[k], True
+    return some
+
+
+@kernel
+def gaps_of_pairs(world, state, pairs):
+    """Write the contacts of the listed pairs to `arriving`, also those apart; return how many."""
+    forward_kinematics(world.mechanism, state.q, state.body)
+    return detect(
+        world.shapes,
+        state.cut.pairs[:pairs],
+        state.body.rotation,
+        state.body.position,
+        math.inf,
+        state.arriving,
+    )
+
+
+@kernel
+def add_part(state, h):
+    """Add the impulses of the forces of a part of h seconds."""
+    add_multiple(state.cut.penalty, h, state.penalty_force)
+    add_multiple(state.cut.friction, h, state.friction_force)
+
+
+@kernel
+def take_contacts(world, state):
+    """Take the contacts at a touch as those of the step; return False if there are too many.
+
+    Contacts of other components stay, and those that have struck and are apart now: the record shows
+    their impulses.
+    """
+    now, before, found, kept = state.contacts, state.previous, state.arriving, 0
+    count, found_count = state.contact_count[0], contacts_at_end(world, state)
+    if found_count < 0:
+        return False
+    for i in range(count):
+        copy_all(before, i, now, i)
+        state.row_impulse[i] = state.contact_impulse[i]
+    state.contact_count[1] = count
+    room = now.gap.shape[0]  # for those that are apart
+    for i in range(found_count):
+        room -= takes_part(world, state, found, i)
+    for i in range(count):
+        room -= before.idle[i]
+    for i in range(count):
+        if not before.idle[i]:
+            apart = state.row_impulse[i] != 0.0 and not is_among(found, found_count, before, i)
+            if not apart or room <= 0:
+                continue
+            room -= 1
+        copy_all(now, kept, before, i)
+        if not before.idle[i]:
+            now.gap[kept], now.normal_force[kept], now.idle[kept] = 0.0, 0.0, True
+            store(now.friction_force, kept, (0.0, 0.0, 0.0))
+        state.contact_impulse[kept] = state.row_impulse[i]
+        kept += 1
+    begin = 0
+    for i in range(found_count):
+        if not takes_part(world, state, found, i):
+            continue
+        if kept == now.gap.shape[0]:
+            return False
+        copy_found(now, kept, found, i)
+        now.mark[kept], now.normal_force[kept], state.contact_impulse[kept] = 0, 0.0, 0.0
+        store(now.friction_force, kept, (0.0, 0.0, 0.0))
+        state.contact_count[0] = kept + 1
+        old = contact_before(state, kept, begin)
+        if old >= 0:
+            begin = old + 1
+            state.contact_impulse[kept] = state.row_impulse[old]
+        kept += 1
+    state.contact_count[0] = kept
+    return True
+
+
+@kernel
+def is_among(found, count, contacts, i):
+    """Return whether contact i is found again, by shapes and feature."""
+    again = False
+    for k in range(count):
+        again = again or same_name(found, k, contacts, i)
+    return again
+
+
+@kernel
+def strike(world, state, flies):
+    """Resolve the impact at a touch; return False if M is not definite."""
+    if not locate(world, state):
+        return False
+    classify(world, state, state.contact_count[0])
+    for t in range(state.moving.shape[0]):
+        state.cut.struck[t] = state.cut.struck[t] or state.state_of_tree[t] == COLLIDING
+    resolve_collisions(world, state)
+    if flies:
+        let_go(world, state)
+    return True
+
+
+@kernel
+def let_go(world, state):
+    """Take contacts that an impact has separated out of the forces of the rest of the step."""
+    contacts, now, count, some = (
+        state.contacts,
+        state.scratch_contacts,
+        state.contact_count[0],
+        False,
+    )
+    for t in range(state.moving.shape[0]):
+        collides = state.moving[t] and state.state_of_tree[t] == COLLIDING
+        some = some or collides
+        state.rests[t] = state.rests[t] and not collides
+    if not some:
+        return
+    for i in range(count):
+        copy_contact(now, i, contacts, i)
+    contact_velocities(world.mechanism, state.body, state.v, now, count)
+    for i in range(count):
+        a, b = world.tree_of_body[contacts.body_a[i]], contacts.body_b[i]
+        if contacts.idle[i] or state.state_of_tree[a] != COLLIDING:
+            continue
+        if now.normal_velocity[i] > world.approach_velocity and contacts.gap[i] >= -CLOSE:
+            contacts.mark[i] = LEFT
+        elif contacts.mark[i] != LEFT:
+            state.rests[a] = True
+            if b >= 0:
+                state.rests[world.tree_of_body[b]] = True
+
+
+@kernel
+def end_step(world, state):
+    """Write the end of the step, put together from whole and from cut steps."""
+    cut = state.cut
+    copy_into(state.q, cut.end_q)
+    copy_into(state.v, cut.end_v)
+    copy_into(state.penalty_force, cut.end_penalty)
+    copy_into(state.friction_force, cut.end_friction)
+    state.contacts.idle[: state.contact_count[0]] = False
+    cut.elapsed[0] = 0.0
+    for t in range(state.moving.shape[0]):
+        state.moving[t] = True
+        if cut.struck[t]:
+            state.state_of_tree[t] = COLLIDING

@@ -1,0 +1,322 @@
+"""Impacts at the moment of touch: motions between impacts are exact, so closed forms are met."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from iapb.advice.certificate import certify
+from iapb.contact.laws import ImpulseAugmented
+from iapb.haptics.coupling import FourChannel
+from iapb.run import Run
+from iapb.scene import scene_from_text
+from iapb.simulation import Simulation, simulate
+
+G = 9.81
+WIDTH, HEIGHT = 0.1, 0.06
+CORNERS = 0.5 * np.array([[WIDTH, HEIGHT], [-WIDTH, HEIGHT], [-WIDTH, -HEIGHT], [WIDTH, -HEIGHT]])
+INERTIA = (WIDTH**2 + HEIGHT**2) / 12.0
+# Some ten impacts multiply the rounding of a touch (1e-15 m) by ten each at worst.
+EXACT = 1e-8
+
+FLOOR = "walls: [{name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}]"
+
+
+def toss_text(
+    state: NDArray[np.float64], rate: float, friction: float = 0.0, seconds: float = 0.4
+) -> str:
+    x, y, angle, vx, vy, spin = state.tolist()
+    return f"""name: toss
+rate: {rate}
+duration: {seconds}
+gravity: [0, -{G}]
+contact: {{restitution: 0.6, friction: {friction}}}
+bodies:
+  - {{name: box, joint: planar, mass: 1, inertia: {INERTIA!r},
+     position: [{x!r}, {y!r}, {angle!r}], velocity: [{vx!r}, {vy!r}, {spin!r}],
+     shapes: [{{kind: box, size: [{WIDTH}, {HEIGHT}]}}]}}
+{FLOOR}
+"""
+
+
+def heights(q: NDArray[np.float64], v: NDArray[np.float64], t: float) -> NDArray[np.float64]:
+    """Return the heights of the four corners after t seconds of flight."""
+    y, angle = q[1] + t * v[1] - 0.5 * G * t * t, q[2] + t * v[2]
+    return np.asarray(y + math.sin(angle) * CORNERS[:, 0] + math.cos(angle) * CORNERS[:, 1])
+
+
+def tossed(
+    state: NDArray[np.float64], restitution: float, friction: float, seconds: float
+) -> tuple[NDArray[np.float64], int]:
+    """Return where the box is in the end, and the number of its impacts: parabolas between touches
+    that a root finder finds."""
+    q, v, left, impacts = state[:3].copy(), state[3:].copy(), seconds, 0
+    while True:
+        times = np.linspace(0.0, left, 4000)
+        low = np.array([heights(q, v, t) for t in times]) < 0.0
+        falls = [
+            (k, i) for k, i in np.argwhere(low[1:] & ~low[:-1]).tolist() if times[k + 1] > 1e-9
+        ]
+        touches = [
+            (brentq(lambda t: heights(q, v, t)[i], times[k] or 1e-9, times[k + 1], xtol=1e-16), i)  # noqa: B023
+            for k, i in falls[:4]
+        ]
+        t, corner = min(touches, default=(left, -1))
+        q = q + t * v - [0.0, 0.5 * G * t * t, 0.0]
+        v = v - [0.0, G * t, 0.0]
+        left -= t
+        if corner < 0:
+            return q, impacts
+        impacts += 1
+        c, s = math.cos(q[2]), math.sin(q[2])
+        row = np.array([0.0, 1.0, c * CORNERS[corner, 0] - s * CORNERS[corner, 1]])
+        along = np.array([1.0, 0.0, -s * CORNERS[corner, 0] - c * CORNERS[corner, 1]])
+        v = v + coulomb(np.stack([row, along]), v, restitution, friction)
+
+
+def coulomb(
+    rows: NDArray[np.float64], v: NDArray[np.float64], restitution: float, friction: float
+) -> NDArray[np.float64]:
+    """Return the change of v by one impact with Coulomb's law: it sticks, or slides one way."""
+    moved = rows / [1.0, 1.0, INERTIA]
+    inverse, before = rows @ moved.T, rows @ v
+    due = -np.array([(1.0 + restitution) * before[0], before[1]])
+    normal, side = np.linalg.solve(inverse, due)
+    if abs(side) <= friction * normal:
+        return np.asarray(moved.T @ [normal, side])
+    for sign in (-1.0, 1.0):
+        impulse = np.array([1.0, sign * friction])
+        impulse *= due[0] / (inverse[0] @ impulse)
+        if impulse[0] >= 0.0 and sign * (before + inverse @ impulse)[1] <= 0.0:
+            return np.asarray(moved.T @ impulse)
+    raise AssertionError("Coulomb's law has no solution")
+
+
+def states(count: int, seed: int) -> list[NDArray[np.float64]]:
+    rng = np.random.default_rng(seed)
+    least, most = [0.0, 0.1, 0.0, -1.0, -1.0, -10.0], [0.0, 0.4, 6.28, 1.0, 1.0, 10.0]
+    return [rng.uniform(least, most) for _ in range(count)]
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize("rate", [250.0, 1000.0])
+def test_a_tossed_box_lands_where_it_should(rate: float, friction: float) -> None:
+    for state in states(4, seed=2):
+        truth, impacts = tossed(state, 0.6, friction, 0.4)
+        run = simulate(scene_from_text(toss_text(state, rate, friction)))
+        assert np.abs(run.q[-1] - truth).max() < EXACT
+        assert len(run.impacts.step) == impacts
+
+
+def test_impacts_at_steps_miss_it_by_far() -> None:
+    """The test above can fail: with impacts at the start of a step it does."""
+    state = states(4, seed=2)[0]
+    text = toss_text(state, 1000.0).replace("{rest", "{impact_time: step, rest")
+    truth, _ = tossed(state, 0.6, 0.0, 0.4)
+    assert np.abs(simulate(scene_from_text(text)).q[-1] - truth).max() > 1e3 * EXACT
+
+
+def bouncing(more: str = "", rate: float = 1000.0, seconds: float = 1.0) -> str:
+    return f"""name: ball
+rate: {rate}
+duration: {seconds}
+gravity: [0, -{G}]
+contact: {{restitution: 1}}
+bodies:
+  - {{name: ball, joint: planar, mass: 1, inertia: 0.004, position: [0, 0.2, 0],
+     shapes: [{{kind: circle, radius: 0.1}}]}}
+{more}{FLOOR}
+"""
+
+
+def test_elastic_bounces_keep_their_height() -> None:
+    run = simulate(scene_from_text(bouncing(seconds=10.0)))
+    fall = math.sqrt(2.0 * 0.1 / G)
+    phase = (10.0 + fall) % (2.0 * fall) - fall
+    assert run.q[-1, 1] == pytest.approx(0.2 - 0.5 * G * phase**2, abs=1e-10)
+    assert len(run.impacts.step) == math.floor((10.0 + fall) / (2.0 * fall))
+    total = run.energy["kinetic"] + run.energy["potential"]
+    assert np.ptp(total) < 1e-11
+    assert np.abs(run.energy["integration_residual"]).max() < 1e-11
+
+
+def test_impacts_say_when_and_where_they_happen() -> None:
+    run = simulate(scene_from_text(bouncing()))
+    fall = math.sqrt(2.0 * 0.1 / G)
+    np.testing.assert_allclose(run.impacts.time, fall * np.arange(1, 8, 2)[: len(run.impacts.time)])
+    np.testing.assert_allclose(run.impacts.q[:, 1], 0.1, atol=1e-12)
+    np.testing.assert_allclose(run.impacts.v_minus[:, 1], -G * fall)
+    assert certify(run).passed
+
+
+def test_a_ball_that_bounces_to_rest_rests() -> None:
+    text = bouncing(seconds=2.0).replace("restitution: 1", "restitution: 0.5")
+    run = simulate(scene_from_text(text))
+    assert abs(run.q[-1, 1] - 0.1) < 1e-9 and np.abs(run.v[-1]).max() < 1e-9
+    assert (np.diff(run.energy["kinetic"] + run.energy["potential"]) < 1e-12).all()
+
+
+BESIDE = """  - {name: other, joint: planar, mass: 2, inertia: 0.01, position: [50, 0.15, 0.3],
+     velocity: [0, 0, 3], shapes: [{kind: box, size: [0.1, 0.06]}]}
+"""
+
+
+def test_another_group_keeps_its_bits() -> None:
+    """A body that is cut in other steps, or in the same ones, changes nothing far away."""
+    alone = simulate(scene_from_text(bouncing()))
+    beside = simulate(scene_from_text(bouncing(BESIDE)))
+    assert (beside.q[:, :3] == alone.q).all() and (beside.v[:, :3] == alone.v).all()
+    assert len(beside.impacts.step) > len(alone.impacts.step)
+
+
+def test_single_steps_give_the_bits_of_one_run() -> None:
+    text = toss_text(states(1, seed=5)[0], 500.0)
+    run, simulation = simulate(scene_from_text(text)), Simulation(scene_from_text(text))
+    for k in range(run.steps):
+        result = simulation.step()
+        assert (result.q == run.q[k + 1]).all() and (result.v == run.v[k + 1]).all()
+
+
+@pytest.mark.parametrize(("ratio", "collisions"), [(1, 3), (100, 31), (10_000, 314)])
+def test_two_masses_and_a_wall_count_the_digits_of_pi(ratio: float, collisions: int) -> None:
+    """Galperin (2003): a heavy ball drives a light one against a wall, without loss."""
+    run = simulate(
+        scene_from_text(f"""name: pi
+rate: 1000
+duration: 20
+contact: {{restitution: 1}}
+bodies:
+  - {{name: light, joint: prismatic, axis: [1, 0], mass: 1, position: [0.5],
+     shapes: [{{kind: circle, radius: 0.1}}]}}
+  - {{name: heavy, joint: prismatic, axis: [1, 0], mass: {ratio}, position: [1.0],
+     velocity: [-0.5], shapes: [{{kind: circle, radius: 0.1}}]}}
+walls: [{{name: wall, kind: half_plane, point: [0, 0], normal: [1, 0]}}]
+""")
+    )
+    assert len(run.impacts.step) == collisions
+    assert run.energy["kinetic"][-1] == pytest.approx(run.energy["kinetic"][0], rel=1e-9)
+
+
+def test_a_cradle_with_gaps_passes_the_blow_on() -> None:
+    balls = "".join(
+        f"  - {{name: b{k}, joint: prismatic, axis: [1, 0], mass: 1, position: [{0.2001 * k!r}],\n"
+        f"     velocity: [{float(k == 0)}], shapes: [{{kind: circle, radius: 0.1}}]}}\n"
+        for k in range(5)
+    )
+    run = simulate(
+        scene_from_text(
+            f"name: cradle\nrate: 250\nduration: 0.1\ncontact: {{restitution: 1}}\nbodies:\n{balls}"
+        )
+    )
+    np.testing.assert_allclose(run.v[-1], [0.0, 0.0, 0.0, 0.0, 1.0], atol=1e-12)
+    assert run.q[-1, 4] == pytest.approx(4 * 0.2001 + 0.1 - 4e-4, abs=1e-12)
+
+
+def plate(speed: float, more: str = "") -> Run:
+    return simulate(
+        scene_from_text(f"""name: bullet
+rate: 1000
+duration: 0.01
+contact: {{restitution: 0.5{more}}}
+bodies:
+  - {{name: bullet, joint: planar, mass: 0.01, inertia: 1.0e-6, position: [-0.55, 0.01, 0],
+     velocity: [{speed}, 0, 0], shapes: [{{kind: circle, radius: 0.005}}]}}
+walls: [{{name: plate, kind: box, size: [0.01, 1], center: [0, 0]}}]
+""")
+    )
+
+
+@pytest.mark.parametrize("speed", [100.0, 300.0, 900.0])
+def test_a_bullet_stops_at_the_plate(speed: float) -> None:
+    run, touch = plate(speed), 0.54 / speed
+    assert run.q[-1, 0] == pytest.approx(-0.01 - 0.5 * speed * (0.01 - touch), rel=1e-9)
+    assert not run.distrust
+
+
+def test_with_impacts_at_steps_it_passes_and_is_flagged() -> None:
+    run = plate(300.0, ", impact_time: step")
+    assert run.q[-1, 0] > 0.0 and "passes through" in run.distrust[0]
+
+
+def test_sticks_that_cross_edge_on_edge_do_not_pass() -> None:
+    run = simulate(
+        scene_from_text("""name: sticks
+dimensions: 3
+rate: 1000
+duration: 0.05
+bodies:
+  - {name: stick, joint: free_flyer, mass: 0.1, inertia: [0.00133, 1.7e-06, 0.00133],
+     shapes: [{kind: box, size: [0.01, 0.4, 0.01]}], position: [-0.0531, 0, 0, 0, 0, 0, 1],
+     velocity: [20, 0, 0, 0, 0, 0]}
+walls: [{name: bar, kind: box, size: [0.01, 0.01, 0.4], center: [0, 0, 0.1]}]
+""")
+    )
+    assert run.q[:, 0].max() < -0.00999
+    assert np.abs(run.v[-1, :3]).max() < 1e-9
+
+
+def test_a_slider_between_stops_bounces_exactly() -> None:
+    """The ends of a joint's range are touched as walls are."""
+    run = simulate(
+        scene_from_text("""name: slider
+rate: 300
+duration: 1
+contact: {restitution: 1}
+bodies:
+  - {name: slider, joint: prismatic, axis: [1, 0], mass: 1, velocity: [3.7],
+     joint_limits: [-0.1, 0.2]}
+""")
+    )
+    path = (run.time * 3.7 + 0.1) % 0.6
+    np.testing.assert_allclose(run.q[:, 0], np.minimum(path, 0.6 - path) - 0.1, atol=1e-11)
+
+
+def test_a_swinging_arm_meets_its_stop_where_it_is() -> None:
+    """A pendulum against a stop at its lowest point keeps its energy."""
+    run = simulate(
+        scene_from_text("""name: arm
+rate: 1000
+duration: 3
+gravity: [0, -9.81]
+contact: {restitution: 1}
+bodies:
+  - {name: arm, joint: revolute, mass: 1, inertia: 0.02, center_of_mass: [0, -0.3],
+     position: [1.0], joint_limits: [0, 3]}
+""")
+    )
+    total = run.energy["kinetic"] + run.energy["potential"]
+    assert len(run.impacts.step) > 3
+    np.testing.assert_allclose(run.impacts.q[:, 0], 0.0, atol=1e-12)
+    assert np.ptp(total) < 1e-5  # the order-two swing alone has 1e-6
+
+
+def test_the_devices_limit_holds_for_the_sum_of_a_step() -> None:
+    run = simulate(
+        scene_from_text("""name: corner
+rate: 100
+duration: 0.2
+contact: {restitution: 1}
+hand: {body: ball}
+device: {force_limit: [10, 10, 1]}
+couplings: {four_channel: {stiffness: [1, 1, 1], damping: [0, 0, 0]}}
+bodies:
+  - {name: ball, joint: planar, mass: 1, inertia: 0.004, velocity: [-1, -1.001, 0],
+     position: [0.11, 0.11, 0], shapes: [{kind: circle, radius: 0.1}]}
+walls:
+  - {name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}
+  - {name: side, kind: half_plane, point: [0, 0], normal: [1, 0]}
+"""),
+        ImpulseAugmented(rendering="scale"),
+        FourChannel((1.0, 1.0, 1.0), (0.0, 0.0, 0.0)),
+    )
+    assert np.abs(run.impulse / run.dt).max() <= 10.0
+    assert run.impulse.any()
+
+
+def test_the_paper_keeps_its_moment() -> None:
+    text = bouncing().replace("{restitution: 1}", "paper")
+    assert not scene_from_text(text).contact.at_touch
