@@ -108,6 +108,8 @@ class Simulation:
             *(self.law, self.effects) if self.compiled else (Penalty(),)
         )
         self.port = self.system.make_port(self.coupling, self.effects, external=device is not None)
+        if not isinstance(self.coupling, NoCoupling):
+            self.state.cut.whole[:] = self.system.tool_tree
         self.link = (
             None if device is None else DeviceLink(device, self.world, self.state, self.port)
         )

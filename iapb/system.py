@@ -276,7 +276,8 @@ class System:
         _factored(state.mass_matrix, state.lower)
         state.group_of_tree[:] = state.island_of_tree[:] = np.arange(trees)
         state.located_q[:] = np.nan
-        state.h[:], state.moving[:], state.cut.arriving[:] = self.dt, True, -1
+        state.h[:], state.moving[:] = self.dt, True
+        state.cut.arriving[:] = state.cut.whole[:] = -1
         return block(state)
 
     def make_port(

@@ -53,13 +53,13 @@ def impacts_of_run(run: Run, scene: Scene) -> tuple[tuple[ImpactCase, ...], int]
     other_law = scene.contact.self_collision_rows == "per_body" or len(values) != 1 or rubbing
     cases, left_out = [], 0
     for blow in _group_impacts(run, mechanism):
-        if other_law or blow.scaled:
+        if other_law or blow.scaled or blow.several:
             left_out += 1
             continue
         rows, v = _rows_of_step(run, mechanism, blow), blow.v_minus
         closing = rows @ v < -approach
         case = ImpactCase(
-            mechanism.mass_matrix(run.q[blow.step]),
+            mechanism.mass_matrix(blow.q),
             rows[closing],
             v,
             float(values[0]),
@@ -108,12 +108,14 @@ def problems_of_run(run: Run, scene: Scene) -> list[StruckImpact]:
     rubbing = bool(run.law_settings.get("friction_in_impacts"))
     per_body = scene.contact.self_collision_rows == "per_body"
     for number, blow in enumerate(_group_impacts(run, mechanism), 1):
-        v, mass = blow.v_minus, mechanism.mass_matrix(run.q[blow.step])
+        if blow.several:
+            continue
+        v, mass = blow.v_minus, mechanism.mass_matrix(blow.q)
         rows = _rows_of_step(run, mechanism, blow)
         closing = rows @ v < -approach
         if not closing.any():
             continue
-        e, mu = _coefficients(system, run, blow.step, np.array(blow.contacts)[closing])
+        e, mu = _coefficients(system, run, blow.q, np.array(blow.contacts)[closing])
         name = f"impact {number} at {run.time[blow.step]:.4g} s"
         smooth = ImpactProblem.from_impact(mass, rows[closing], v, e, name=name)
         rough = None
@@ -136,14 +138,14 @@ def problems_of_run(run: Run, scene: Scene) -> list[StruckImpact]:
 
 
 def _coefficients(
-    system: System, run: Run, step: int, contacts: NDArray[np.int64]
+    system: System, run: Run, q: Floats, contacts: NDArray[np.int64]
 ) -> tuple[Floats, Floats]:
-    """Return e and mu (k,) of contacts of a step, from the shapes that touch there.
+    """Return e and mu (k,) of contacts at configuration q, from the shapes that touch there.
 
     A run records the bodies of a contact, not its shapes: they are those of the nearest contact of
     these bodies that the geometry gives. A joint's stop has none.
     """
-    there, table = system.contacts_at(run.q[step], TOUCHING), run.contacts
+    there, table = system.contacts_at(q, TOUCHING), run.contacts
     e = np.full(len(contacts), system.scene.contact.restitution)
     mu = np.zeros(len(contacts))
     for k, m in enumerate(contacts):
@@ -177,6 +179,8 @@ class _GroupImpact(NamedTuple):
     v_minus: Floats
     v_plus: Floats  # (d,); outside the group's coordinates it equals v_minus
     scaled: bool
+    q: Floats  # where it happened
+    several: bool  # impacts of the group at several moments of the step: contacts show the last one
 
 
 def _group_impacts(run: Run, mechanism: Mechanism) -> list[_GroupImpact]:
@@ -185,7 +189,6 @@ def _group_impacts(run: Run, mechanism: Mechanism) -> list[_GroupImpact]:
     for step in np.unique(table.step).tolist():
         of_step = np.flatnonzero(table.step == step)
         touching = range(int(run.contacts.offsets[step]), int(run.contacts.offsets[step + 1]))
-        before, after = table.v_minus[of_step[0]], table.v_plus[of_step[-1]]
         groups = {
             k: _trees_of_group(run, mechanism, touching, int(table.group[k])) for k in of_step
         }
@@ -196,8 +199,19 @@ def _group_impacts(run: Run, mechanism: Mechanism) -> list[_GroupImpact]:
             contacts = [
                 m for m in touching if mechanism.tree_of_body[run.contacts.body_a[m]] in trees
             ]
-            scaled = any(table.scale[k] != 1.0 for k in of_step if groups[k] == trees)
-            found.append(_GroupImpact(step, contacts, before, np.where(own, after, before), scaled))
+            lines = [k for k in of_step.tolist() if groups[k] == trees]
+            before, after = table.v_minus[lines[0]], table.v_plus[lines[-1]]
+            found.append(
+                _GroupImpact(
+                    step,
+                    contacts,
+                    before,
+                    np.where(own, after, before),
+                    scaled=any(table.scale[k] != 1.0 for k in lines),
+                    q=table.q[lines[0]],
+                    several=len({float(table.time[k]) for k in lines}) > 1,
+                )
+            )
     return found
 
 
@@ -220,7 +234,7 @@ def _rows_of_step(
 ) -> Floats:
     """Return the rows nᵀ(J_a − J_b) (k, d) of the group's contacts, or the rows along other
     directions (k, 3)."""
-    table, q = run.contacts, run.q[blow.step]
+    table, q = run.contacts, blow.q
     rows = np.zeros((len(blow.contacts), mechanism.nv))
     for i, m in enumerate(blow.contacts):
         along = table.normal[m] if directions is None else directions[i]

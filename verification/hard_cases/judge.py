@@ -208,13 +208,16 @@ def restitution_residual(run: Run) -> float:
     if run.law == "rigid constraints" or not len(struck):
         return math.nan
     step = np.repeat(np.arange(run.steps), np.diff(contacts.offsets))[struck]
-    mechanism, q = mechanism_of(scene_from_text(run.scene_source)), run.q[step]
+    first = np.searchsorted(impacts.step, step)
+    last = np.searchsorted(impacts.step, step, side="right") - 1
+    at_once = impacts.time[first] == impacts.time[last]  # contacts show one moment of a step
+    struck, step, first, last = struck[at_once], step[at_once], first[at_once], last[at_once]
+    mechanism, q = mechanism_of(scene_from_text(run.scene_source)), impacts.q[first]
     point, normal = contacts.point[struck], contacts.normal[struck]
     rows = mechanism.rows_along(q, contacts.body_a[struck], point, normal)
     rows -= mechanism.rows_along(q, contacts.body_b[struck], point, normal)
     rows *= contacts.impulse[struck, None]
-    v_minus = impacts.v_minus[np.searchsorted(impacts.step, step)]
-    v_plus = impacts.v_plus[np.searchsorted(impacts.step, step, side="right") - 1]
+    v_minus, v_plus = impacts.v_minus[first], impacts.v_plus[last]
     before = np.bincount(step, np.einsum("kd,kd->k", rows, v_minus))
     after = np.bincount(step, np.einsum("kd,kd->k", rows, v_plus))
     judged = after - before > 0.0

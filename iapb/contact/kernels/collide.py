@@ -85,33 +85,24 @@ def gather_rows(world, state, island, size):
 
 
 @kernel
-def largest_share(impulse, before, dofs, size, dt, force_limit):
-    """Return the largest share in [0, 1] with |P_i + share · p_i| / Δt <= the limit of each dof, in
+def largest_share(impulse, dofs, size, dt, force_limit):
+    """Return the largest share in [0, 1] with |share · p_i / Δt| <= the limit of each dof, in
     floating point too.
 
-    impulse (size,) p [N s, N m s] of a group; before (d,) P, of earlier impacts of the step; dofs
-    (size,) its coordinates; force_limit (d,) [N, N m], inf = none
+    impulse (size,) [N s, N m s] of a group; dofs (size,) its coordinates; force_limit (d,) [N, N
+    m], inf = none
     """
     share = 1.0
     for i in range(size):
-        force, limit = (
-            abs(impulse[i]) / dt,
-            room_for(impulse[i], before[dofs[i]], dt, force_limit[dofs[i]]),
-        )
+        force, limit = abs(impulse[i]) / dt, force_limit[dofs[i]]
         if share * force > limit:
             share = limit / force
     for i in range(size):
-        while share * abs(impulse[i]) / dt > room_for(
-            impulse[i], before[dofs[i]], dt, force_limit[dofs[i]]
+        while (
+            share * abs(impulse[i]) / dt > force_limit[dofs[i]]
         ):  # the division rounded up: one step back
             share = np.nextafter(share, 0.0)
     return share
-
-
-@kernel
-def room_for(impulse, before, dt, limit):
-    """Return what earlier impacts of the step leave of a limit, in the direction of an impulse."""
-    return max(0.0, limit - (before if impulse > 0.0 else -before) / dt)
 
 
 @kernel
@@ -312,9 +303,7 @@ def resolve_island(world, state, island):
     rank, clamp, friction_share, solved = resolve_rows(world, state, size, count)
     share, line, approaching = 1.0, log.logged[0], 0
     if world.switches.impulse_limit:
-        share = largest_share(
-            work.momentum, state.impulse, state.dofs, size, world.dt, world.impulse_limit
-        )
+        share = largest_share(work.momentum, state.dofs, size, world.dt, world.impulse_limit)
     if world.switches.spreading:
         for t in range(world.tree_start.shape[0]):
             if state.island_of_tree[t] == island:

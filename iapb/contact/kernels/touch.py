@@ -13,6 +13,7 @@ the bodies involved back, and does it in parts:
 5. After MOST impacts, contacts that have struck hold for the rest of the step: a ball comes to rest.
    What still overlaps at the end strikes at the start of the next step.
 
+The group of a tool that a coupling moves is not cut: its device takes the impulse of a whole step.
 A component that reaches another tree in the rest of the step is joined with it, and both start again.
 Each impact is passive, and so is each part of the motion; so the step is passive.
 """
@@ -93,10 +94,23 @@ def arrives(world, state, i):
     found = state.arriving
     if not found.is_new[i] or found.gap[i] >= -max(CLOSE, SAG * deepest_of_groups(world, state, i)):
         return False
+    if is_whole(world, state, found.body_a[i], found.body_b[i]):
+        return False
     if not met_before(state, i):
         return True
     speed = -found.normal_velocity[i]
     return speed > world.approach_velocity and -found.gap[i] <= 4.0 * world.dt * speed + CLOSE
+
+
+@kernel
+def is_whole(world, state, body, other):
+    """Return whether one of two bodies is in the group that is never cut."""
+    whole, group = state.cut.whole[0], state.group_of_tree
+    if whole < 0:
+        return False
+    if group[world.tree_of_body[body]] == group[whole]:
+        return True
+    return other >= 0 and group[world.tree_of_body[other]] == group[whole]
 
 
 @kernel
@@ -162,6 +176,8 @@ def find_fast_pairs(world, state):
         a, b = world.pairs[k, 0], world.pairs[k, 1]
         way = way_of(world, state, a) + way_of(world, state, b)
         if not way > 0.5 * min(sweep.thin[a], sweep.thin[b]):
+            continue
+        if is_whole(world, state, shapes.body[a], shapes.body[b]):
             continue
         apart = subtract(middle_of(world, state, a), middle_of(world, state, b))
         near = sweep.radius[a] + sweep.radius[b] + way

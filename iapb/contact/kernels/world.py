@@ -112,6 +112,7 @@ class Cut(NamedTuple):
 
     arriving: Annotated[Integers, "1"]  # contacts at the end of the step in `State.arriving`, or −1
     elapsed: Annotated[Floats, "1"]  # [s] since the start of the step
+    whole: Annotated[Integers, "1"]  # a tree whose group is never cut, −1 = none
     q: Annotated[Floats, "coordinate"]
     v: Annotated[Floats, "velocity"]
     impulse: Annotated[Floats, "velocity"]

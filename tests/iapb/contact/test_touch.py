@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 from iapb.advice.certificate import certify
 from iapb.contact.laws import ImpulseAugmented
-from iapb.haptics.coupling import FourChannel
+from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling
 from iapb.run import Run
 from iapb.scene import scene_from_text
 from iapb.simulation import Simulation, simulate
@@ -294,27 +294,23 @@ bodies:
     assert np.ptp(total) < 1e-5  # the order-two swing alone has 1e-6
 
 
-def test_the_devices_limit_holds_for_the_sum_of_a_step() -> None:
-    run = simulate(
-        scene_from_text("""name: corner
-rate: 100
-duration: 0.2
-contact: {restitution: 1}
-hand: {body: ball}
-device: {force_limit: [10, 10, 1]}
-couplings: {four_channel: {stiffness: [1, 1, 1], damping: [0, 0, 0]}}
+@pytest.mark.parametrize("coupling", [FourChannel([1e5], [70.0]), NoCoupling()])
+def test_the_tool_of_a_device_is_not_cut(coupling: Coupling) -> None:
+    """Device and tool take an impulse in the same step; without a device the tool is cut."""
+    scene = scene_from_text("""name: slider
+rate: 1000
+duration: 0.1
+contact: {restitution: 0.5}
+hand: {body: tool, force: [-1, 0, 0]}
+device: {damping: [1]}
 bodies:
-  - {name: ball, joint: planar, mass: 1, inertia: 0.004, velocity: [-1, -1.001, 0],
-     position: [0.11, 0.11, 0], shapes: [{kind: circle, radius: 0.1}]}
-walls:
-  - {name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}
-  - {name: side, kind: half_plane, point: [0, 0], normal: [1, 0]}
-"""),
-        ImpulseAugmented(rendering="scale"),
-        FourChannel((1.0, 1.0, 1.0), (0.0, 0.0, 0.0)),
-    )
-    assert np.abs(run.impulse / run.dt).max() <= 10.0
-    assert run.impulse.any()
+  - {name: tool, joint: prismatic, axis: [1, 0], mass: 0.1, position: [0.011],
+     velocity: [-0.3], shapes: [{kind: circle, radius: 0.01}]}
+walls: [{name: wall, kind: half_plane, point: [0, 0], normal: [1, 0]}]
+""")
+    run = simulate(scene, ImpulseAugmented(), coupling)
+    first = run.impacts.time[0] - run.impacts.step[0] * run.dt
+    assert (first > 0.0) == isinstance(coupling, NoCoupling)
 
 
 def test_the_paper_keeps_its_moment() -> None:
