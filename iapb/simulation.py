@@ -136,7 +136,7 @@ class Simulation:
         ArgumentError
             The force has a wrong shape or is not finite, or the scene has no hand.
         IapbError
-            The step fails (see `iapb.contact.kernels.step`), or the law returned an invalid step.
+            The step fails (see `iapb.contact.kernels.motion`), or the law returned an invalid step.
         """
         if hand_force is not None:
             self.hold(hand_force)

@@ -19,7 +19,7 @@ from iapb.names import one_of
 from iapb.run import COLLIDING, FREE, RESTING
 from iapb.schema import Floats
 
-INTEGRATORS = ("momentum", "semi_implicit_euler")  # of a scene: see `iapb.contact.kernels.step`
+INTEGRATORS = ("momentum", "semi_implicit_euler")  # of a scene: see `iapb.contact.kernels.motion`
 RENDERINGS = ("full", "saturate", "scale", "spread")
 
 # Parts of a scene's contact section. A law's attribute `uses` names the parts that affect it.
@@ -137,7 +137,7 @@ class ImpulseAugmented(_EngineLaw):
 
     Parameters
     ----------
-    integrator : ``momentum`` or ``semi_implicit_euler`` (`iapb.contact.kernels.step`); default: the
+    integrator : ``momentum`` or ``semi_implicit_euler`` (`iapb.contact.kernels.motion`); default: the
         scene's.
     rendering : how the device's force limits affect impulses (paper section VI). ``full`` ignores
         the limits; ``saturate`` clips the force on the device; ``scale`` scales the impulse of tool

@@ -13,6 +13,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from iapb.contact.laws import ENGINE_LAWS
 from iapb.run import Run
@@ -90,11 +91,13 @@ class Trajectory:
         """M at each impact, (k, d, d)."""
         return np.asarray(self.system.mechanism.mass_matrices(self.run.impacts.q))
 
-    @property
-    def is_cut(self) -> bool:
-        """Whether impacts happen within steps, so that a step has more than one velocity."""
-        impacts = self.run.impacts
-        return bool((impacts.time > impacts.step * self.run.dt).any())
+    @cached_property
+    def cut(self) -> NDArray[np.bool_]:
+        """Whether impacts happen within each step (n,): it then has more than one velocity, and its
+        forces are means."""
+        impacts, found = self.run.impacts, np.zeros(self.run.steps, np.bool_)
+        found[impacts.step[impacts.time > impacts.step * self.run.dt]] = True
+        return found
 
     @cached_property
     def v_struck(self) -> Floats:
@@ -223,7 +226,7 @@ def forces_explain_motion(trajectory: Trajectory) -> Found:
 def velocity_moves_configuration(trajectory: Trajectory) -> Found:
     """Largest |q_{k+1} − q_k ⊕ Δt v_{k+1}|∞ over |q| + Δt |v|; rotations are integrated, as they
     are no vectors."""
-    if not trajectory.is_explained or trajectory.is_cut:
+    if not trajectory.is_explained or trajectory.cut.any():
         return None
     run, mechanism = trajectory.run, trajectory.system.mechanism
     if mechanism.nq == mechanism.nv:
@@ -359,7 +362,7 @@ def friction_takes_energy(trajectory: Trajectory) -> Found:
         or trajectory.turns_over
     ):
         return None
-    moved = trajectory.displacements
+    moved = np.where(trajectory.cut[:, None], 0.0, trajectory.displacements)
     work = np.einsum("nd,nd->n", run.friction_force, moved)
     arcs = 0.01 * float(np.max(norm(run.friction_force) * norm(moved)))
     return float(np.max(work)) / (float(np.max(np.abs(work))) + arcs + TINY), 0.1
