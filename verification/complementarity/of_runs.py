@@ -199,7 +199,7 @@ def _group_impacts(run: Run, mechanism: Mechanism) -> list[_GroupImpact]:
             contacts = [
                 m for m in touching if mechanism.tree_of_body[run.contacts.body_a[m]] in trees
             ]
-            lines = [k for k in of_step.tolist() if groups[k] == trees]
+            lines = [int(k) for k in of_step if groups[k] == trees]
             before, after = table.v_minus[lines[0]], table.v_plus[lines[-1]]
             found.append(
                 _GroupImpact(
