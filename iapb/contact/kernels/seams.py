@@ -64,6 +64,9 @@ def explained(world, state, contacts, i, count):
                 and dot(load(contacts.normal, k), normal) > _SAME_NORMAL
             ):
                 sag = max(sag, -contacts.gap[k])
+        arrives = contacts.is_new[j] and contacts.normal_velocity[j] < -world.approach_velocity
+        if sag <= _OVERLAPS and arrives:  # a corner that is met at once is no seam
+            continue
         for body, other, sign in (
             (contacts.body_a[j], contacts.body_b[j], 1.0),
             (contacts.body_b[j], contacts.body_a[j], -1.0),
