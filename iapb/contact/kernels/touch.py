@@ -286,6 +286,8 @@ def cut_component(world, state, applied, root):
         h, status = move_to_touch(world, state, applied, end)
         if status != OK:
             return status
+        if h >= left:  # at the very end: it strikes in the next step
+            break
         add_part(state, h)
         left -= h
         cut.elapsed[0] += h
