@@ -439,7 +439,10 @@ def move_to_touch(world, state, applied, left):
     pairs, stops = pairs_that_touch(world, state)
     low, high = 0.0, left
     _, _, guess = next_touch(world, state, pairs, stops, left)
+    expected = math.inf  # when the touch comes, as seen from `low`
     for turn in range(SEARCHES):
+        if not low < guess < high:
+            guess = expected
         if turn % 4 == 3 or not low < guess < high:
             guess = 0.5 * (low + high)
         h = guess
@@ -455,6 +458,7 @@ def move_to_touch(world, state, applied, left):
             return h, OK
         else:
             low = h
+            expected = guess
     return high, move_part(world, state, applied, high)
 
 
