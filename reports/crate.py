@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from reports.numbers_file import NUMBERS_NAME
-from reports.pages.builder import FIRST_PAGE
+from reports.pages.page import FIRST_PAGE
 from reports.store.io import write_whole
 
 CRATE_NAME = "ro-crate-metadata.json"

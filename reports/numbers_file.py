@@ -93,6 +93,8 @@ def _of_evidence(evidence: Evidence) -> Iterator[tuple[str, Table]]:
         if isinstance(value, Table)
     )
     yield from ((f"effects/{scene}", table) for scene, table in evidence.effects.items())
+    for page, tables in evidence.numbers.items():
+        yield from ((f"{page}/{name}", table) for name, table in tables.items())
     for topic in evidence.topics:
         found = enumerate(topic.parts, 1)
         yield from _by_time(

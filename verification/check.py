@@ -35,6 +35,7 @@ from verification.finding import (
     of_each,
     verdict_of_law,
 )
+from verification.numbers import Values, value_tables
 from verification.region import Region
 from verification.table import HOLDS, Row, Table, by_part, ranges, table_from
 
@@ -107,6 +108,7 @@ class Check:
     says : judged table -> the result in words with numbers. A topic may also return one or more
         Parts; a Part with an empty verdict gets that of the table. By default the question with the
         number of rows that hold
+    targets : table -> a `Part.on` for each number of a topic that has a target; each decides alone
     spans : keys of the columns whose smallest and largest value the default sentence gives
     conditions, parts, counts, timed, prose : keys of the columns that are conditions, that split
         the rows into parts, that count the cases of a row, that depend on measured times, and that
@@ -134,6 +136,7 @@ class Check:
     row: Callable[[Study, Any], Row | Iterable[Row]]
     holds: Callable[[Row], bool | None] | None = None
     says: Callable[[Table], Said] | None = None
+    targets: Callable[[Table], Iterable[Part]] | None = None
     spans: Collection[str] = ()
     conditions: Collection[str] = ()
     parts: Collection[str] = ()
@@ -227,6 +230,8 @@ class Check:
     def sentences(self, table: Table) -> tuple[Part, ...]:
         """Return what a topic says of the judged table; nothing if the table is neither judged nor
         told."""
+        if self.targets is not None:
+            return tuple(self.targets(table))
         if self.says is None:
             if self.holds is None and not table.holds:
                 return ()
@@ -282,13 +287,17 @@ class Topic:
 
     key, title, question : as in `Finding`; checks : one table each, in the order of the report
     says : (tables by key of the check, all parts) -> the answer on the first page
+    numbers, times : (tables by key of the check) -> the numbers that pages quote by key, and those
+        that depend on measured times; see `verification.numbers`
     """
 
     key: str
     title: str
     question: str
     checks: tuple[Check, ...]
-    says: Callable[[Mapping[str, Table], Sequence[Part]], str]
+    says: Callable[[Mapping[str, Table], Sequence[Part]], str] | None = None
+    numbers: Callable[[Mapping[str, Table]], Values] | None = None
+    times: Callable[[Mapping[str, Table]], Values] | None = None
 
     def __call__(
         self,
@@ -346,7 +355,10 @@ class Topic:
                 said = partial(check.sentences, tables[check.key])
                 parts += attempt(f"{check.key}, its sentence", said, lost) or ()
         parts += given
-        answer = attempt("the answer", partial(self.says, tables, parts), lost) or ""
+        answer = ""
+        if self.says is not None:
+            answer = attempt("the answer", partial(self.says, tables, parts), lost) or ""
+        quoted = attempt("the numbers", partial(self._quoted, tables), lost) or {}
         known = {one.case for one in failures}
         return finding_of(
             self.key,
@@ -354,6 +366,12 @@ class Topic:
             self.question,
             answer,
             parts,
-            tables,
+            {**tables, **quoted},
             [*failures, *(one for one in lost if one.case not in known)],
         )
+
+    def _quoted(self, tables: Mapping[str, Table]) -> dict[str, Table]:
+        """Return the tables of the numbers that pages quote."""
+        if self.numbers is None:
+            return {}
+        return value_tables(self.numbers(tables), self.times(tables) if self.times else None)

@@ -18,7 +18,7 @@ from typing import TypeVar
 import numpy as np
 
 from reference.one_thread import one_thread
-from verification.finding import MIXED, REPRODUCED, Failure, Part, attempt
+from verification.finding import REFUTED, REPRODUCED, Failure, Part, attempt
 
 Key = TypeVar("Key")
 Result = TypeVar("Result")
@@ -93,7 +93,12 @@ def target(
 ) -> Part:
     """Return a part on a target; `miss` is the text for the first page if the target is missed."""
     return Part.of(
-        asked, measured, wanted, REPRODUCED if met else MIXED, timed=timed, miss="" if met else miss
+        asked,
+        measured,
+        wanted,
+        REPRODUCED if met else REFUTED,
+        timed=timed,
+        miss="" if met else miss,
     )
 
 
@@ -116,7 +121,7 @@ def limited(
     )
     return Part(
         f"{asked} {value:.3g}{unit}{more}. Target: {wanted}.",
-        REPRODUCED if met else MIXED,
+        REPRODUCED if met else REFUTED,
         timed=timed,
         miss="" if met else f"{told} (our own target: {wanted.removesuffix(unit)})",
         asked=asked,

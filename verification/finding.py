@@ -92,6 +92,7 @@ class Part:
         never decides
     named : the quantity in words, for "fails in ..."; by default the name
     asked, measured, target : the part as a row of a table, if it has them
+    value, limit, unit, least : a number and its target: at most, or `least`: at least, the limit
     """
 
     sentence: str
@@ -111,6 +112,31 @@ class Part:
     asked: str = ""
     measured: str = ""
     target: str = ""
+    value: float | None = None
+    limit: float | None = None
+    unit: str = ""
+    least: bool = False
+
+    @classmethod
+    def on(
+        cls,
+        name: str,
+        value: float | None,
+        limit: float,
+        unit: str = "",
+        *,
+        least: bool = False,
+        timed: bool = False,
+    ) -> Part:
+        """Return the part on one number with a target, which decides alone: missed is REFUTED.
+
+        A target without a value, for example because no case could tell, is NOT_TESTABLE.
+        """
+        verdict = NOT_TESTABLE
+        if value is not None:
+            met = value >= limit if least else value <= limit
+            verdict = REPRODUCED if met else REFUTED
+        return cls("", verdict, name, timed=timed, value=value, limit=limit, unit=unit, least=least)
 
     @classmethod
     def of(

@@ -18,12 +18,13 @@ def format_number(value: float, digits: int = 4) -> str:
     if value == 0.0:
         return "0"
     if _PLAIN_FROM <= abs(value) < _PLAIN_TO:
-        decimals = max(digits - 1 - math.floor(math.log10(abs(value))), 0)
-        return f"{value:.{decimals}f}".replace("-", MINUS)
+        decimals = digits - 1 - math.floor(math.log10(abs(value)))
+        return f"{round(value, decimals):,.{max(decimals, 0)}f}".replace("-", MINUS)
     mantissa, exponent = f"{value:.{max(digits - 1, 0)}e}".split("e")
     if float(mantissa) == int(float(mantissa)):
         mantissa = str(int(float(mantissa)))
-    return f"{mantissa.replace('-', MINUS)} × 10{str(int(exponent)).translate(_SUPERSCRIPTS)}"
+    power = f"10{str(int(exponent)).translate(_SUPERSCRIPTS)}"
+    return power if mantissa == "1" else f"{mantissa.replace('-', MINUS)} · {power}"
 
 
 def power_of_ten(value: float) -> str:
@@ -42,7 +43,7 @@ def format_cell(value: Any, digits: int = 4) -> str:
     if hasattr(value, "item"):
         value = value.item()
     if isinstance(value, int):
-        return f"{value:,}".replace(",", "\N{NARROW NO-BREAK SPACE}").replace("-", MINUS)
+        return f"{value:,}".replace("-", MINUS)
     if isinstance(value, float):
         return format_number(value, digits)
     return str(value)

@@ -1,5 +1,4 @@
-"""Fill the templates with records and figures: a first page and one page for each section, all
-self-contained."""
+"""Fill the ten templates with records, numbers and figures; every page is self-contained."""
 
 from __future__ import annotations
 
@@ -9,7 +8,6 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from importlib.resources import files
-from itertools import groupby
 from posixpath import dirname, relpath
 from typing import Any
 
@@ -18,24 +16,41 @@ from markupsafe import Markup
 
 from reports.figures import RECIPES
 from reports.figures.condition_map import condition_map
-from reports.figures.figure import Figure, Recipe, draw, swatch
+from reports.figures.figure import TEXTS, Figure, Recipe, draw, swatch
 from reports.figures.numbers import format_cell, is_number
-from reports.pages.first import LATER, NEXT, facts, made_from
 from reports.pages.formulas import formula, prose
+from reports.pages.numbers import FILTERS, is_absent, numbers_of
+from reports.pages.page import PAGES
 from reports.pages.records import Evidence
-from reports.pages.sections import SECTIONS
-from reports.pages.terms import HEADINGS, explained
 from verification import finding
-from verification.claims.conditions import Condition
-from verification.claims.peg import ALL_THREE, NAMED
 from verification.finding import Failure, Finding, Part
 from verification.hard_cases.findings import ENGINE
-from verification.scenes.measures import COORDINATES
+from verification.numbers import NUMBERS, TIMES
 from verification.table import Table
 
-FIRST_PAGE = "report.html"
 # Largest number of table rows on a page, to keep it small; numbers.json has all of them.
 ROWS_SHOWN = 200
+# Whose numbers the templates may quote, computed or not.
+QUOTED = (
+    "claims",
+    "figures",
+    "energy-gains",
+    "exact-energy",
+    "proofs",
+    "properties",
+    "scene-ledger",
+    "mechanics",
+    "complementarity",
+    "hard-cases",
+    "ordinary",
+    "engines",
+    "stability",
+    "accuracy",
+    "haptic-rate",
+    "effects",
+    "survival",
+    "port",
+)
 # The mark of each verdict, of each kind of outcome of a claim, and of the parts that decide
 # nothing. Marks differ in shape as well as in colour.
 OUTCOMES = (*finding.VERDICTS, *finding.KINDS, finding.MISPRINT, finding.BEYOND)
@@ -77,14 +92,12 @@ def draw_all(
 
 
 def build_report(evidence: Evidence, drawn: Iterable[Figure] = ()) -> dict[str, str]:
-    """Return the HTML of the first page and of each section by file name, FIRST_PAGE first.
+    """Return the HTML of the ten pages by file name, the first page first.
 
     Missing evidence is printed as "not computed in this run". Every page links to the others and
     needs neither network nor script.
     """
-    figures: dict[str, list[Figure]] = {}
-    for figure in drawn:
-        figures.setdefault(figure.section, []).append(figure)
+    given = tuple(drawn)
     environment = _environment()
     text = (
         '(() => {\n"use strict";\n'
@@ -95,33 +108,26 @@ def build_report(evidence: Evidence, drawn: Iterable[Figure] = ()) -> dict[str, 
     # The browser runs only this script and makes no requests; without the script the page is
     # complete.
     policy = f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'"
+    bare = {
+        key: Figure(key, words.get("number", ""), words["title"]) for key, words in TEXTS.items()
+    }
     shared = {
+        "pages": PAGES,
         "script": Markup(text),
         "policy": policy,
         "evidence": evidence,
-        "figures": figures,
+        "topics": {topic.key: topic for topic in evidence.topics},
+        "numbers": numbers_of(evidence, QUOTED),
+        "figures": bare | {figure.key: figure for figure in given},
         "run_counts": Counter(user for run in evidence.runs for user in run.used_by),
-        "groups": [
-            (group, list(found))
-            for group, found in groupby(SECTIONS, key=lambda section: section.group)
-        ],
+        "maps": {claim.key: map_of(claim) for claim in evidence.claims},
     }
-    first = environment.get_template("first.html.j2").render(
-        shared,
-        facts=facts(evidence),
-        made_from=made_from(evidence),
-        first_map=first_map(evidence.claims),
-        next=NEXT,
-        later=LATER,
+    return link_across(
+        {
+            page.file: environment.get_template(page.template).render(shared, page=page)
+            for page in PAGES
+        }
     )
-    maps = {claim.key: map_of(claim) for claim in evidence.claims}
-    layout = environment.get_template("section.html.j2")
-    pages = {
-        section.page: layout.render(shared, section=section, maps=maps) for section in SECTIONS
-    }
-    return {
-        name: explained(page) for name, page in link_across({FIRST_PAGE: first} | pages).items()
-    }
 
 
 def link_across(pages: Mapping[str, str]) -> dict[str, str]:
@@ -167,44 +173,6 @@ def map_of(claim: Finding) -> Figure | None:
     caption = f"Each place is a pair of values of the axes; smaller dot: {claim.key} holds in only some trials there."
     return condition_map(
         f"map-{claim.key}", f"Where {claim.key} holds", caption, table, *claim.axes
-    )
-
-
-def first_map(claims: Sequence[Finding]) -> Figure | None:
-    """Return the first page's map of where C10 holds, start by start on the full grid; None if not
-    computed."""
-    table = next((claim.tables.get(claim.key) for claim in claims if claim.key == "C10"), None)
-    parts = (*COORDINATES, ALL_THREE)
-    if table is None or "part" not in table.keys:
-        return None
-    grid = table.where(friction=0.0, travel=Condition().travel)
-    grid = grid.only(part in parts for part in grid["part"])
-    if not grid.rows:
-        return None
-    each = ", ".join(
-        f"{sum(shown.decided)} of {len(shown.decided)} in {NAMED[part]}"
-        for part in parts
-        for shown in [grid.where(part=part)]
-    )
-    caption = (
-        "Each mark is one start of the peg, by tilt and by distance from the wall. A dot: the "
-        "hand's path with "
-        "impulses (IAPB) is the nearest to the path at a rigid wall (ideal). A cross: the path "
-        "with springs alone (PB) "
-        "or at a rigid wall felt through a spring (CBuc) is nearer. A ring cannot tell: the "
-        "distances differ by less "
-        f"than the error of the ideal path. Of the starts on this grid that can tell, IAPB is "
-        f"nearest in {each}."
-    )
-    return condition_map(
-        "where-c10",
-        "Where impulses are nearest to a rigid wall",
-        caption,
-        grid,
-        "tilt",
-        "clearance",
-        "part",
-        words=NAMED,
     )
 
 
@@ -266,8 +234,9 @@ def counted(part: Part) -> str:
 
 
 def tables_without(topic: Finding, figures: Sequence[Figure]) -> tuple[tuple[str, Table], ...]:
-    """Return the names and tables of a topic that are not drawn in a figure."""
+    """Return the names and tables of a topic that are neither drawn in a figure nor quoted."""
     drawn = {name for figure in figures for name in figure.inputs}
+    drawn |= {f"{topic.key}/{name}" for name in (NUMBERS, TIMES)}
     return tuple(
         (name, table) for name, table in topic.tables.items() if f"{topic.key}/{name}" not in drawn
     )
@@ -290,16 +259,17 @@ def _environment() -> Environment:
         mark=OUTCOME_MARKS.__getitem__,
         outcome_class=OUTCOME_CLASSES.__getitem__,
         judged=judged,
-        heading=lambda title: HEADINGS.get(title, title),
         badge_words=badge_words,
         counted=counted,
         tables_without=tables_without,
         ranked=ranked,
         worst_first=worst_first,
         title=lambda name: name[:1].upper() + name[1:],
+        **FILTERS,
     )
     environment.globals |= {"rows_shown": ROWS_SHOWN, "engine": ENGINE}
     environment.tests["numeric"] = is_number
+    environment.tests["absent"] = is_absent
     return environment
 
 

@@ -40,6 +40,9 @@ class Evidence:
         default_factory=dict
     )  # of each scene, as `verification.cost.effects` has them
     topics: tuple[Finding, ...] = ()  # the first page has the answer of each, in this order
+    numbers: Mapping[str, Mapping[str, Table]] = field(
+        default_factory=dict
+    )  # that pages quote, of what is no topic: see `verification.numbers`
     failed: tuple[FailedCases, ...] = ()
     provenance: Mapping[str, str] = field(default_factory=dict)
     runs: tuple[StoredFile, ...] = ()  # that the numbers were computed from

@@ -17,7 +17,8 @@ from reports.evidence import gather
 from reports.evidence.stage import Stage
 from reports.figures.figure import Figure, Panel
 from reports.numbers_file import NUMBERS_NAME, read_numbers
-from reports.pages.builder import FIRST_PAGE, build_report
+from reports.pages.builder import build_report
+from reports.pages.page import FIRST_PAGE
 from reports.pages.records import Evidence
 from reports.report import write_companions, write_report
 from reports.runner import Runner
@@ -109,7 +110,7 @@ def test_the_numbers_are_those_of_tables_and_figures_and_name_each_run_with_its_
     )
     hashes = {entry.content_hash for entry in Runner(out / "runs").store.entries()}
     assert set(numbers.runs.values()) == hashes
-    page = (out / "report" / "provenance.html").read_text()
+    page = (out / "report" / "data.html").read_text()
     assert "each of the 2 runs" in page and "uncommitted changes" in page
 
 

@@ -17,7 +17,7 @@ from verification.cost.robots import MANY, ONE, ROBOTS
 from verification.cost.solvers import DAQP, IAPB, IMPACT_TIMES, KERNEL, printed_faster
 from verification.cost.steps import BODIES, IDEAL, RACES
 from verification.cost.trajectories import BELOW, MOTIONS, TIMED_OUT, WORTH, curves, worth
-from verification.finding import MIXED, NOT_COMPUTED, REPRODUCED, Finding
+from verification.finding import NOT_COMPUTED, REFUTED, REPRODUCED, Finding
 from verification.haptic_rate import BENCH, KERNELS, RATE, SOLVERS, TOPIC, quoting
 from verification.table import Table, table_from
 
@@ -218,7 +218,8 @@ def _found(tables: Tables) -> Finding:
 def test_a_miss_is_called_one(tables: Tables, change: Tables, number: str) -> None:
     found = _found(tables | change)
     missed, others = (
-        [part for part in found.parts if (part.verdict == MIXED) == miss] for miss in (True, False)
+        [part for part in found.parts if (part.verdict == REFUTED) == miss]
+        for miss in (True, False)
     )
     assert (
         len(missed) == 1
@@ -335,7 +336,7 @@ def test_a_motion_on_which_another_world_is_more_exact_is_a_miss() -> None:
     errors = {"IAPB": (1e-1, 1e-2), "PB": (1.0,), IDEAL: (1e-1, 5e-3)}
     [part] = MOTIONS.sentences(_table(**errors))
     assert (
-        part.verdict == MIXED
+        part.verdict == REFUTED
         and f"as exact as {IDEAL} (smallest errors 1 % and 0.5 % of" in part.miss
     )
     [part] = MOTIONS.sentences(_table(**errors | {IDEAL: (1e-1, 2e-2)}))
