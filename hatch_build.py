@@ -25,7 +25,7 @@ class EngineLibrary(BuildHookInterface):  # type: ignore[type-arg]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Compile before the files are collected."""
-        subprocess.run([sys.executable, "-m", "iapb.building"], cwd=self.root, check=True)
+        subprocess.run([sys.executable, "-m", "iapb.building.engine"], cwd=self.root, check=True)
         build_data["artifacts"].append(LIBRARY)
         build_data["pure_python"] = False
         build_data["tag"] = f"py3-none-{platform_tag(Path(self.root, LIBRARY).read_bytes())}"

@@ -10,15 +10,10 @@ from typing import TYPE_CHECKING, Any
 from iapb.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from iapb.advice.certificate import Certificate as Certificate
-    from iapb.advice.certificate import certify as certify
-    from iapb.advice.certificate import certify_impacts as certify_impacts
     from iapb.advice.checks import check_scene as check_scene
     from iapb.advice.effects import Effect as Effect
     from iapb.advice.effects import decide_effects as decide_effects
-    from iapb.contact.impact import FrictionalImpact as FrictionalImpact
     from iapb.contact.impact import Impact as Impact
-    from iapb.contact.impact import Impacts as Impacts
     from iapb.contact.impact import resolve_frictional_impact as resolve_frictional_impact
     from iapb.contact.impact import resolve_impact as resolve_impact
     from iapb.contact.impact import resolve_impacts as resolve_impacts
@@ -40,16 +35,16 @@ if TYPE_CHECKING:
     from iapb.simulation import Simulation as Simulation
     from iapb.simulation import simulate as simulate
     from verification import check_passivity as check_passivity
+    from verification.certificate import Certificate as Certificate
+    from verification.certificate import certify as certify
+    from verification.certificate import certify_impacts as certify_impacts
 
     __version__: str
 
 _HOME = {
-    "iapb.advice.certificate": ("Certificate", "certify", "certify_impacts"),
     "iapb.advice.checks": ("check_scene",),
     "iapb.contact.impact": (
-        "FrictionalImpact",
         "Impact",
-        "Impacts",
         "resolve_frictional_impact",
         "resolve_impact",
         "resolve_impacts",
@@ -68,9 +63,8 @@ _HOME = {
     "iapb.run": ("Run",),
     "iapb.scene": ("Scene", "find_scene", "load_scene", "scene_folder"),
     "iapb.simulation": ("Simulation", "simulate"),
-    "verification": (
-        "check_passivity",
-    ),  # of an upper package, for users; the engine itself never imports one
+    # upper packages bring these as entry points: the engine never imports one
+    "": ("Certificate", "certify", "certify_impacts", "check_passivity"),
 }
 
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}

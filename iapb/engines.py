@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from iapb.mechanics.mechanism import Mechanism
+from iapb.numerics.schema import Floats, blank, quantities, zeros_of
 from iapb.run import ContactTable, EffectRow, ImpactTable, Run
 from iapb.scene.mechanism import mechanism_of, wrench_of
 from iapb.scene.model import Scene, SpatialScene
-from iapb.schema import Floats, blank, quantities, zeros_of
 
 Progress = Callable[[int, int], None]
 

@@ -22,12 +22,15 @@ def lazy_names(
     Parameters
     ----------
     package : the package's ``__name__``.
-    homes : maps each name to its module; ".case" is a module of the package.
+    homes : maps each name to its module; ".case" is a module of the package; "" marks a name that an
+        upper package brings, as an entry point of the group "package.names".
     """
 
     def load(name: str) -> Any:
         if name not in homes:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        if not homes[name]:
+            return extension(f"{package}.names", name)
         try:
             home = import_module(homes[name], package)
         except ModuleNotFoundError as error:

@@ -6,13 +6,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from iapb.compiled import Entry, block, copy_into, kernel
 from iapb.contact.kernels.motion import STATUS_TEXT
 from iapb.contact.kernels.step import advance, contact_state
 from iapb.haptics.rendering import NO_COUPLING, couple, move_device, render
-from iapb.linalg import load, store
+from iapb.numerics.compiled import Entry, block, copy_into, kernel
+from iapb.numerics.linalg import load, store
+from iapb.numerics.schema import Quantity, blank, quantities
 from iapb.run import MADE_AFTERWARDS, ContactTable, ImpactTable, Run
-from iapb.schema import Quantity, blank, quantities
 
 DEVICE_NOT_FINITE = 1 + max(STATUS_TEXT)
 FAILURES = STATUS_TEXT | {

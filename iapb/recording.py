@@ -15,9 +15,9 @@ from iapb.haptics.rendering import PLANNED
 from iapb.loop import LINES, STATES, make_record
 from iapb.mechanics.energy import FORCES, energy_of_run, last_of
 from iapb.mechanics.mechanism import Mechanism
+from iapb.numerics.schema import Floats
 from iapb.run import UNSOLVED, ContactTable, EffectRow, ImpactTable, Later, Run, digests
 from iapb.scene.model import SpatialScene
-from iapb.schema import Floats
 from iapb.thinning import Thinned
 
 _CONTACT_ROWS_PER_CHUNK = (

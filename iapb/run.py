@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from iapb.errors import name_the_extra
 from iapb.lazy import extension, needed
-from iapb.schema import Booleans, Floats, Integers, Quantity, States, quantities, quantity
+from iapb.numerics.schema import Booleans, Floats, Integers, Quantity, States, quantities, quantity
 
 FREE, COLLIDING, RESTING = 0, 1, 2  # contact states of the paper, section III
 UNSOLVED = (

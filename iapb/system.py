@@ -11,29 +11,28 @@ from numpy.typing import ArrayLike
 
 from iapb.advice.effects import EFFECT_NAMES, Effect, active_names, decide_for
 from iapb.advice.solids import solids_of
-from iapb.compiled import Entry, block
+from iapb.contact.finding import ContactFinder, Contacts
 from iapb.contact.geometry import ContactBuffer, Shapes, contact_capacity
 from iapb.contact.kernels.broadphase import bounding_sphere, make_broad_phase
 from iapb.contact.kernels.impact import ImpactWork
 from iapb.contact.kernels.impact_friction import FrictionWork
 from iapb.contact.kernels.implicit import RestWork
-from iapb.contact.kernels.motion import STATUS_TEXT, TOO_MANY_CONTACTS
-from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.touch import MOST
 from iapb.contact.kernels.unilateral import PushWork, ShareWork
 from iapb.contact.kernels.world import Cut, State, Sweep, Switches, World
 from iapb.contact.laws import ImpulseAugmented
-from iapb.errors import ArgumentError, IapbError
+from iapb.errors import ArgumentError
 from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling, UnilateralCoupler
 from iapb.haptics.rendering import PLANNED, Port
-from iapb.linalg import cholesky
 from iapb.loop import ADVANCE, IMPACTS, make_record, run_steps
 from iapb.mechanics.kernels.arrays import make_workspace
 from iapb.mechanics.mechanism import Mechanism
 from iapb.mechanics.structure import make_free_motion
+from iapb.numerics.compiled import Entry, block
+from iapb.numerics.linalg import cholesky
+from iapb.numerics.schema import blank, quantities, zeros_of
 from iapb.scene import Scene, SpatialScene
 from iapb.scene import mechanism as scene_parts
-from iapb.schema import blank, quantities, zeros_of
 
 _factored = Entry(cholesky)
 
@@ -90,33 +89,22 @@ class System:
         """Return the mechanism of the device, which equals the tree in the hand (paper VI)."""
         return self.mechanism.alone(self.tool_tree)
 
-    def contacts_at(self, q: ArrayLike, margin: float = 0.0) -> ContactBuffer:
-        """Return the contacts with gap <= `margin` [m] (infinity allowed) at configuration q, from
-        geometry alone.
+    @cached_property
+    def finder(self) -> ContactFinder:
+        """Finds contacts at given placements of the bodies."""
+        return ContactFinder(self.shapes, self.pairs)
+
+    def contacts_at(self, q: ArrayLike, margin: float = 0.0) -> Contacts:
+        """Return the contacts with gap <= `margin` [m] (infinity allowed) at configuration q.
 
         Raises
         ------
         ArgumentError
             q is not a valid configuration, or the margin is NaN.
-        IapbError
-            There are more contacts than `capacity`.
         """
         if np.isnan(margin):
             raise ArgumentError("margin", margin, "a distance in metres, infinity allowed")
-        buffer, count = zeros_of(ContactBuffer, contact=self.capacity), 0
-        if len(self.pairs):
-            count = int(
-                detect(
-                    block(self.shapes),
-                    self.pairs,
-                    *self.mechanism.placements(q),
-                    float(margin),
-                    block(buffer),
-                )
-            )
-        if count < 0:
-            raise IapbError(STATUS_TEXT[TOO_MANY_CONTACTS])
-        return ContactBuffer(*(column[:count] for column in buffer))  # type: ignore[arg-type]
+        return self.finder.find(*self.mechanism.placements(q), margin)
 
     def world_under(self, law: Any, effects: Sequence[Effect] | None = None) -> World:
         """Return the parameters of the scene, with the switches of its effects under one of the

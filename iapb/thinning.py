@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from iapb.numerics.schema import Integers, quantities
 from iapb.run import ContactTable, ImpactTable, Run
-from iapb.schema import Integers, quantities
 
 _STATES = ("time", *(each.name for each in quantities(Run, "time")))
 _STEPS = tuple(each.name for each in quantities(Run, "step"))

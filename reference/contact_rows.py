@@ -1,28 +1,33 @@
 """Contacts of a system as rows, gaps and velocities, and their record after a step.
 
-Rows nᵀ(J_a − J_b), (11)-(12), are built from Pinocchio's frame Jacobians of the bodies and the
-contacts of `reference.contact_finding`. Nothing here calls the engine's mechanics or its narrow
-phase.
+Pinocchio places the bodies, the engine's narrow phase finds the contacts there, and Pinocchio's
+frame Jacobians give the rows nᵀ(J_a − J_b), (11)-(12). Nothing here calls the engine's mechanics.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from itertools import product
+from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from iapb.contact.finding import Contacts
+from iapb.contact.geometry import BOX, ENDLESS, POLYGON, Shapes
 from iapb.mechanics.mechanism import Mechanism
 from reference import Floats
-from reference.contact_finding import Contacts, find_contacts
 from reference.rigid_body import PinocchioMechanism, model_of
 
 # An nᵀJ below this share of its summands is rounding error, not a lever arm of the contact.
 ROW_NOISE = 1e-13
+# Shapes that are apart graze if they just reach the plane of a face, up to this share of the size:
+# they slide or roll past each other, as over a seam of two tiles. Far above rounding.
+GRAZE = 1e-9
 _mechanics: WeakKeyDictionary[Mechanism, PinocchioMechanism] = WeakKeyDictionary()
+_solids: WeakKeyDictionary[Mechanism, _Solids] = WeakKeyDictionary()
 
 
 def mechanics_of(system: Any) -> PinocchioMechanism:
@@ -45,11 +50,116 @@ class ContactRows:
 def find_rows(system: Any, q: Floats, v: Floats, margin: float) -> ContactRows:
     """Return the contacts of `system` at q (nq,) with gap <= margin [m]."""
     axes, origins, frames = mechanics_of(system).bodies(q)
-    geometry = find_contacts(system.shapes, system.pairs, axes, origins, margin)
+    geometry = system.finder.find(axes, origins, margin)
+    if (geometry.gap > 0.0).any():
+        geometry = _without_grazing(geometry, _solids_of(system), axes, origins)
     if len(system.stops.bound):
         geometry = _with_stops(geometry, system, q, origins, frames, margin)
     rows = contact_jacobian(geometry.normal, geometry, origins, frames)
     return ContactRows(geometry, rows, geometry.gap, rows @ v)
+
+
+class _Solids(NamedTuple):
+    """Corners and faces of all shapes in the axes of their bodies; a ball has one corner.
+
+    Shape s has the corners `first_corner[s]` to `first_corner[s + 1]`, and its faces likewise.
+    """
+
+    radius: Floats  # (n,) [m] of a ball, else 0
+    size: Floats  # (n,) [m], infinite for planes
+    first_corner: NDArray[np.int64]  # (n + 1,)
+    corner_body: NDArray[np.int32]  # (k,)
+    corner: Floats  # (k, 3)
+    first_face: NDArray[np.int64]  # (n + 1,)
+    face_body: NDArray[np.int32]  # (f,)
+    face_point: Floats  # (f, 3)
+    face_normal: Floats  # (f, 3) outward
+
+
+def _solids_of(system: Any) -> _Solids:
+    """Return the corners and faces of the system's shapes, computed once."""
+    if system.mechanism not in _solids:
+        _solids[system.mechanism] = _corners_and_faces(system.shapes)
+    return _solids[system.mechanism]
+
+
+def _corners_and_faces(shapes: Shapes) -> _Solids:
+    corners, points, normals = list[Floats](), list[Floats](), list[Floats]()
+    for s, kind in enumerate(shapes.kind):
+        middle = shapes.center[s]
+        corner, normal = middle[None], np.zeros((0, 3))
+        if kind == POLYGON:
+            rows = slice(shapes.first[s], shapes.first[s] + shapes.count[s])
+            corner = np.pad(shapes.vertices[rows], ((0, 0), (0, 1)))
+            edge = np.roll(corner, -1, axis=0) - corner
+            normal = np.cross(edge, [0.0, 0.0, 1.0])
+            normal /= np.linalg.norm(normal, axis=1)[:, None]
+        elif kind == BOX:
+            arms = shapes.axes[s] * shapes.half_size[s]
+            signs = np.array(list(product((-1.0, 1.0), repeat=3)))
+            corner = middle + signs @ arms.T
+            normal = np.concatenate([shapes.axes[s].T, -shapes.axes[s].T])
+        corners.append(corner)
+        normals.append(normal)
+        on_face = np.argmax(normal @ corner.T, axis=1)
+        points.append(corner[on_face])
+    number_of_corners = [len(each) for each in corners]
+    number_of_faces = [len(each) for each in normals]
+    extent = np.array([np.ptp(each, axis=0).max() for each in corners])
+    extent[np.isin(shapes.kind, ENDLESS)] = np.inf  # nothing grazes a plane
+    return _Solids(
+        shapes.radius,
+        extent + shapes.radius,
+        np.cumsum([0, *number_of_corners]),
+        np.repeat(shapes.body, number_of_corners),
+        np.concatenate(corners),
+        np.cumsum([0, *number_of_faces]),
+        np.repeat(shapes.body, number_of_faces),
+        np.concatenate(points),
+        np.concatenate(normals),
+    )
+
+
+def _without_grazing(found: Contacts, solids: _Solids, axes: Floats, origins: Floats) -> Contacts:
+    """Leave out contacts that are apart and just reach the plane of a face."""
+
+    def placed(points: Floats, body: NDArray[np.int32]) -> Floats:
+        return np.asarray(np.einsum("nij,nj->ni", axes[body], points) + origins[body])
+
+    grazing = _grazing(
+        found.shape_a,
+        found.shape_b,
+        found.gap,
+        solids.radius,
+        solids.size,
+        solids.first_corner,
+        placed(solids.corner, solids.corner_body),
+        solids.first_face,
+        placed(solids.face_point, solids.face_body),
+        np.einsum("nij,nj->ni", axes[solids.face_body], solids.face_normal),
+    )
+    return Contacts(*(column[~grazing] for column in found))
+
+
+@numba.njit(cache=True, fastmath=False)
+def _grazing(  # type: ignore[no-untyped-def]
+    shape_a, shape_b, gap, radius, size, first_corner, corner, first_face, face_point, face_normal
+):
+    """Return whether each contact (c,) is between shapes that graze."""
+    grazes = np.zeros(len(gap), np.bool_)
+    for c in range(len(gap)):
+        near = GRAZE * (size[shape_a[c]] + size[shape_b[c]])
+        for side in range(2 if gap[c] > near else 0):
+            one, other = (shape_a[c], shape_b[c]) if side == 0 else (shape_b[c], shape_a[c])
+            for f in range(first_face[one], first_face[one + 1]):
+                lowest = np.inf
+                for k in range(first_corner[other], first_corner[other + 1]):
+                    height = 0.0
+                    for i in range(3):
+                        height += (corner[k, i] - face_point[f, i]) * face_normal[f, i]
+                    lowest = min(lowest, height)
+                grazes[c] |= abs(lowest - radius[other]) <= near
+    return grazes
 
 
 def _with_stops(

@@ -7,7 +7,7 @@ import os
 import numpy as np
 from hypothesis import HealthCheck, settings
 
-from iapb.compiled import AS_PYTHON
+from iapb.numerics.compiled import AS_PYTHON
 
 # No deadline in any profile: a first call may load a package.
 settings.register_profile(

@@ -376,7 +376,7 @@ def child_facts(path: Path) -> None:
     from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
     from threadpoolctl import threadpool_info
 
-    from iapb.library import PATH, library, manifest_of
+    from iapb.numerics.library import PATH, library, manifest_of
 
     library()  # made again if it is for another processor
     blas = [one for one in threadpool_info() if one["user_api"] == "blas"]

@@ -22,15 +22,14 @@ import numpy as np
 
 from iapb.advice.loops import MARGIN, SOON, HapticLoop, hold, nearest, scaled
 from iapb.advice.solids import joined, solids_of
-from iapb.compiled import block
 from iapb.contact import geometry, laws
+from iapb.contact.finding import ContactFinder, Contacts
 from iapb.contact.kernels.implicit import COMPLIANCE, FADING
-from iapb.contact.kernels.narrow_phase import detect
 from iapb.names import in_metres
+from iapb.numerics.schema import Floats, Integers
 from iapb.scene import Scene, SpatialScene, mechanism
 from iapb.scene.bodies import inertia_matrix
 from iapb.scene.model import MAX_RATE, Gains, Hand
-from iapb.schema import Floats, Integers, zeros_of
 
 Rows = Integers  # numbers of contacts
 
@@ -134,42 +133,26 @@ class Start:
         self.size = np.array(size)
         self.thickness = np.minimum(self.size[found.shape_a], self.size[found.shape_b])
 
-    def _contacts(self, sizes: list[float]) -> geometry.ContactBuffer:
+    def _contacts(self, sizes: list[float]) -> Contacts:
         """Return the contacts between the closest features of each pair, near or far, and those of
         joint limits."""
-        few, kind, places = (
-            len(self.pairs) <= MANY_PAIRS,
-            self.shapes.kind,
-            self.mechanism.placements(self.q),
-        )
-        corners = np.where(kind == geometry.BOX, 8, np.maximum(self.shapes.count, 2))
-        room = (
-            int(corners[self.pairs].sum()) + 32
-            if few
-            else geometry.contact_capacity(self.shapes, self.pairs)
-        )
-        margin = math.inf if few else max((size for size in sizes if size < math.inf), default=0.0)
-        out, stops = (
-            zeros_of(geometry.ContactBuffer, contact=room + len(self.stops.body)),
-            self.stops,
-        )
-        count = (
-            max(int(detect(block(self.shapes), self.pairs, *places, margin, block(out))), 0)
-            if len(self.pairs)
-            else 0
-        )
-        new = slice(count, count + len(stops.body))
-        out.gap[new], out.normal[new] = (
-            stops.arm * stops.sign * (self.q[stops.coordinate] - stops.bound),
-            0.0,
-        )
-        out.shape_a[new] = out.shape_b[new] = stops.shape
-        out.body_a[new], out.body_b[new], out.point[new] = (
+        margin = math.inf
+        if len(self.pairs) > MANY_PAIRS:
+            margin = max((size for size in sizes if size < math.inf), default=0.0)
+        placed, stops = self.mechanism.placements(self.q), self.stops
+        found = ContactFinder(self.shapes, self.pairs).find(*placed, margin)
+        limits = Contacts(
+            stops.shape,
+            stops.shape,
             stops.body,
             stops.parent,
-            places[1][stops.body],
+            np.zeros_like(stops.body),
+            placed[1][stops.body],
+            np.zeros((len(stops.body), 3)),
+            stops.arm * stops.sign * (self.q[stops.coordinate] - stops.bound),
         )
-        return geometry.ContactBuffer(*(column[: new.stop] for column in out))  # type: ignore[arg-type]
+        both: Any = zip(found, limits, strict=True)
+        return Contacts(*(np.concatenate(columns) for columns in both))
 
     def rows_along(self, contacts: Rows, directions: Floats) -> Floats:
         """Return the Jacobian rows (k, d) of contacts (k,) along directions (k, 3)."""

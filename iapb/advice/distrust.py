@@ -19,11 +19,11 @@ from iapb.mechanics.energy import FORCES, energy_ledger, lost_within, moved_stra
 from iapb.mechanics.joints import KINDS
 from iapb.mechanics.rotations import rotation_of
 from iapb.names import in_metres
+from iapb.numerics.schema import Booleans, Floats, Integers
 from iapb.run import UNSOLVED, Run
 from iapb.scene.bodies import WORLD, inertia_matrix
 from iapb.scene.mechanism import limits_of, mechanism_of, pairs_of, shapes_of
 from iapb.scene.model import scene_kind
-from iapb.schema import Booleans, Floats, Integers
 
 # share of the available energy, or of a free momentum, that errors of a first-order step may add
 UNACCOUNTED = 0.02

@@ -19,6 +19,7 @@ from iapb.contact import laws
 from iapb.contact.geometry import Shapes, contact_capacity
 from iapb.haptics.coupling import Coupling
 from iapb.mechanics.mechanism import Mechanism
+from iapb.numerics.schema import Indices
 from iapb.scene import Scene
 from iapb.scene.mechanism import (
     frictions_of,
@@ -29,7 +30,6 @@ from iapb.scene.mechanism import (
     stops_of,
 )
 from iapb.scene.model import Device
-from iapb.schema import Indices
 
 COUPLING_FIELDS = {"four-channel": "four_channel", "unilateral": "unilateral"}
 TURNING_JOINTS = ("revolute", "continuous", "planar", "spherical", "free_flyer")

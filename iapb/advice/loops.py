@@ -24,7 +24,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from iapb.schema import Floats
+from iapb.numerics.schema import Floats
 
 SLOW = 30.0  # s: a motion that needs longer to grow e-fold counts as stable
 # s: the same for a unilateral coupler that acts before the tool touches, which it soon does

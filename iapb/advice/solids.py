@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from iapb.contact.geometry import ENDLESS, Shapes
-from iapb.schema import Booleans, Floats, Integers
+from iapb.numerics.schema import Booleans, Floats, Integers
 
 GRAZED = 0.1  # of a shape's thickness: a path that enters it by less does not pass through it
 

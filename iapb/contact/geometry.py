@@ -13,7 +13,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from iapb.schema import Booleans, Floats, Indices, Integers, States
+from iapb.numerics.schema import Booleans, Floats, Indices, Integers, States
 
 HALF_PLANE, CIRCLE, POLYGON = 0, 1, 2
 HALF_SPACE, SPHERE, BOX = 3, 4, 5

@@ -15,7 +15,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from iapb.compiled import Entry, block
 from iapb.contact.kernels.resolve import (
     LARGEST_ENTRY,
     NOT_CONVERGED,
@@ -27,9 +26,10 @@ from iapb.contact.kernels.resolve import (
 )
 from iapb.contact.kernels.unilateral import ShareWork
 from iapb.errors import ArgumentError, IapbError, RangeError, SolverError
-from iapb.linalg import cholesky
 from iapb.names import one_of
-from iapb.schema import Floats, zeros_of
+from iapb.numerics.compiled import Entry, block
+from iapb.numerics.linalg import cholesky
+from iapb.numerics.schema import Floats, zeros_of
 
 Arrays = tuple[Floats, Floats, Floats]  # M (d, d), J (c, d), v (d,), or n of each
 METHODS = ("factored", "poisson")
@@ -105,10 +105,6 @@ class Impact(NamedTuple):
     rows_used: int | None
     tangential_impulses: Floats
     friction_share: Any
-
-
-Impacts = Impact  # of many impacts
-FrictionalImpact = Impact
 
 
 def resolve_impact(

@@ -16,8 +16,8 @@ from iapb.contact.kernels.motion import STATUS_TEXT
 from iapb.contact.kernels.world import State
 from iapb.errors import ArgumentError, IapbError
 from iapb.names import one_of
+from iapb.numerics.schema import Floats
 from iapb.run import COLLIDING, FREE, RESTING
-from iapb.schema import Floats
 
 INTEGRATORS = ("momentum", "semi_implicit_euler")  # of a scene: see `iapb.contact.kernels.motion`
 RENDERINGS = ("full", "saturate", "scale", "spread")

@@ -14,12 +14,12 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from iapb.compiled import Entry
 from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.rendering import NO_COUPLING, UNILATERAL, engage
-from iapb.linalg import cholesky, solve_mass
 from iapb.mechanics.bodies import finite_array
-from iapb.schema import Floats
+from iapb.numerics.compiled import Entry
+from iapb.numerics.linalg import cholesky, solve_mass
+from iapb.numerics.schema import Floats
 
 
 class DeviceReading(NamedTuple):

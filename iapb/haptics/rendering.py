@@ -5,10 +5,8 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from iapb.compiled import copy_into, kernel
 from iapb.contact.kernels.motion import LARGEST_SPEED
 from iapb.contact.kernels.narrow_phase import detect
-from iapb.linalg import add, cholesky, dot, load, solve_mass, transform
 from iapb.mechanics.kernels.arrays import MechanismArrays, Workspace
 from iapb.mechanics.kernels.configuration import (
     difference,
@@ -20,8 +18,10 @@ from iapb.mechanics.kernels.configuration import (
 from iapb.mechanics.kernels.dynamics import bias, mass_matrix
 from iapb.mechanics.kernels.free_motion import RIGID, FreeMotion, move_simple_trees
 from iapb.mechanics.kernels.kinematics import add_point_force, forward_kinematics
+from iapb.numerics.compiled import copy_into, kernel
+from iapb.numerics.linalg import add, cholesky, dot, load, solve_mass, transform
+from iapb.numerics.schema import Booleans, Floats, Integers
 from iapb.run import FREE
-from iapb.schema import Booleans, Floats, Integers
 
 NO_COUPLING, FOUR_CHANNEL, UNILATERAL = 0, 1, 2
 PLANNED = 512  # steps for which a time-varying hand force is planned ahead; no chunk is longer

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from iapb.errors import ArgumentError
 from iapb.mechanics.joints import Joint, Mimic
-from iapb.schema import Floats
+from iapb.numerics.schema import Floats
 
 # A placement given with nine digits counts as a rotation; a coarser one would shear the body.
 ROTATION_TOLERANCE = 1e-8

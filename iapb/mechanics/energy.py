@@ -22,12 +22,12 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from iapb.compiled import Entry
 from iapb.errors import ArgumentError
 from iapb.mechanics.kernels.evaluation import impact_loss
 from iapb.mechanics.mechanism import Mechanism
+from iapb.numerics.compiled import Entry
+from iapb.numerics.schema import Floats
 from iapb.run import Run
-from iapb.schema import Floats
 
 FORCES = ("hand", "coupling", "penalty", "friction")
 _impact_loss = Entry(impact_loss)

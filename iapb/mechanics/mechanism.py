@@ -15,8 +15,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from iapb import linalg
-from iapb.compiled import Entry, block
 from iapb.errors import ArgumentError
 from iapb.mechanics import structure
 from iapb.mechanics.bodies import Body, finite_array, float_array, parents_and_trees
@@ -24,7 +22,9 @@ from iapb.mechanics.joints import Joint
 from iapb.mechanics.kernels import configuration, dynamics, evaluation, kinematics
 from iapb.mechanics.kernels.arrays import MechanismArrays, make_workspace
 from iapb.mechanics.urdf import read_urdf
-from iapb.schema import Floats, Integers
+from iapb.numerics import linalg
+from iapb.numerics.compiled import Entry, block
+from iapb.numerics.schema import Floats, Integers
 
 __all__ = ["Body", "Joint", "Mechanism"]
 

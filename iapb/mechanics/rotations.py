@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from iapb.elementary import arc_tangent, hypotenuse, sine_cosine
-from iapb.schema import Floats
+from iapb.numerics.elementary import arc_tangent, hypotenuse, sine_cosine
+from iapb.numerics.schema import Floats
 
 
 def rotation_of(rpy: Any) -> Floats:

@@ -15,12 +15,12 @@ from math import sqrt
 import numpy as np
 
 from iapb.errors import ArgumentError
-from iapb.linalg import product
 from iapb.mechanics.bodies import Body
 from iapb.mechanics.joints import FREE_FLYER, PLANAR, SPHERICAL, Mimic
 from iapb.mechanics.kernels.arrays import MechanismArrays
 from iapb.mechanics.kernels.free_motion import LINKAGE, RIGID, STRAIGHT, FreeMotion
-from iapb.schema import Floats, Integers
+from iapb.numerics.linalg import product
+from iapb.numerics.schema import Floats, Integers
 
 
 def collect_arrays(bodies: tuple[Body, ...], parents: list[int]) -> MechanismArrays:

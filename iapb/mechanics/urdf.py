@@ -26,13 +26,13 @@ from typing import Any, NamedTuple, NoReturn
 import numpy as np
 
 from iapb.errors import ArgumentError
-from iapb.linalg import product
 from iapb.mechanics.bodies import Body
 from iapb.mechanics.joints import Joint, Mimic
 from iapb.mechanics.rotations import rotation_of
 from iapb.mechanics.structure import turned_inertia
 from iapb.names import one_of
-from iapb.schema import Floats
+from iapb.numerics.linalg import product
+from iapb.numerics.schema import Floats
 
 WITH_AXIS = ("revolute", "continuous", "prismatic", "planar")
 WITH_RANGE = ("revolute", "prismatic")

@@ -1,7 +1,7 @@
 """Functions of time in a scene file: arithmetic with t, pi and a few functions, read without
 running Python code.
 
-Their values have the same bits on every processor, because libm is not used: `iapb.elementary`
+Their values have the same bits on every processor, because libm is not used: `iapb.numerics.elementary`
 gives sines, decimal arithmetic the exponential, and multiplication powers.
 """
 
@@ -27,7 +27,7 @@ _LARGEST_EXPONENT = 709.0  # its exponential is still a double
 
 
 def _sine_cosine(x: float) -> tuple[float, float]:
-    from iapb.elementary import sine_cosine  # brings numba along
+    from iapb.numerics.elementary import sine_cosine  # brings numba along
 
     return sine_cosine(x)
 

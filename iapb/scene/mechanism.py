@@ -12,22 +12,22 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from iapb.compiled import block
 from iapb.contact import geometry
 from iapb.contact.geometry import Shapes, candidate_pairs, frame_along, make_shapes
 from iapb.contact.kernels.contact_set import TOUCHING
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.world import Stops
 from iapb.errors import ArgumentError
-from iapb.linalg import product
 from iapb.mechanics.bodies import Body
 from iapb.mechanics.joints import KINDS, Joint, Mimic, ranges_of
 from iapb.mechanics.mechanism import Mechanism
 from iapb.mechanics.rotations import rotation_of
+from iapb.numerics.compiled import block
+from iapb.numerics.linalg import product
+from iapb.numerics.schema import Booleans, Floats, Indices, Integers, zeros_of
 from iapb.scene.bodies import WORLD, inertia_matrix
 from iapb.scene.model import Scene, SpatialScene
 from iapb.scene.parts import SMALLEST_POSITIVE
-from iapb.schema import Booleans, Floats, Indices, Integers, zeros_of
 
 Pairs = Indices
 

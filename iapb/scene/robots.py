@@ -25,9 +25,9 @@ import numpy as np
 from pydantic import Field, ValidationError
 
 from iapb.errors import ArgumentError, Mistake, shown
-from iapb.linalg import product
 from iapb.mechanics.joints import KINDS, Range, ranges_of
 from iapb.names import one_of
+from iapb.numerics.linalg import product
 from iapb.scene.bodies import ORIGIN, WORLD, SpatialBody, SpatialShape
 from iapb.scene.document import Document
 from iapb.scene.parts import Name, Number, ScenePart, Text, Truth, Vector3, mistakes_of

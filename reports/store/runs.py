@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from iapb.errors import RunFileError
+from iapb.numerics.schema import Quantity
 from iapb.run import (
     ContactTable,
     EffectRow,
@@ -21,7 +22,6 @@ from iapb.run import (
     energy_dimension,
     unit_of,
 )
-from iapb.schema import Quantity
 from reference.hdf5 import Budget, attribute_of, dataset_at, group_at, values_at
 from reports.provenance import collect_provenance
 from reports.store import io, schema

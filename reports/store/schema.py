@@ -25,8 +25,8 @@ from typing import Any
 
 import numpy as np
 
+from iapb.numerics.schema import Quantity, quantities
 from iapb.run import STATE_NAMES, ContactTable, ImpactTable, Run
-from iapb.schema import Quantity, quantities
 
 FORMAT = "iapb run"
 TABLE_FORMAT = "iapb table"

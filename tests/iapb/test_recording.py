@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iapb import recording
+from iapb.numerics.schema import quantities
 from iapb.recording import Recorder, chunk_steps
 from iapb.run import UNSOLVED, Run
 from iapb.scene import find_scene, load_scene
-from iapb.schema import quantities
 from iapb.simulation import INTERRUPTED, Simulation, simulate
 from iapb.system import coupling_of
 from iapb.thinning import Thinned

@@ -11,8 +11,8 @@ import pytest
 
 from iapb.advice.checks import check_scene
 from iapb.contact.laws import INTEGRATORS, ImpulseAugmented, Penalty
-from iapb.elementary import sine_cosine
 from iapb.errors import IapbError
+from iapb.numerics.elementary import sine_cosine
 from iapb.run import Run
 from iapb.scene import Scene, find_scene, load_scene, scene_from_text
 from iapb.scene.expressions import function_of

@@ -18,9 +18,9 @@ from iapb.contact.laws import RENDERINGS, ImpulseAugmented, Penalty, StepResult
 from iapb.errors import ArgumentError
 from iapb.haptics.coupling import FourChannel, NoCoupling
 from iapb.loop import CONTACTS, IMPACTS
+from iapb.numerics.schema import quantities
 from iapb.run import FREE, Run
 from iapb.scene import find_scene, load_scene, scene_from_text
-from iapb.schema import quantities
 from iapb.simulation import Simulation, simulate
 from iapb.system import coupling_of, system_of
 from tests.iapb.test_recording import assert_same, results_of

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from iapb.advice.certificate import certify
 from iapb.errors import ArgumentError, SolverError
 from iapb.scene import Scene, find_scene, load_scene, scene_from_text
 from iapb.simulation import simulate
@@ -19,6 +18,7 @@ from reference.event_driven import LinearSystem, event_driven
 from reference.scene_events import scene_truth
 from reference.worlds import run_world
 from tests.reference.scenes import G, scene_of
+from verification.certificate import certify
 
 
 def ball(e: float, mass: float = 1.0) -> LinearSystem:

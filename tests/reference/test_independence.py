@@ -13,7 +13,6 @@ from pathlib import Path
 REFERENCE = Path(__file__).parents[2] / "reference"
 WORLDS = (
     "time_stepping",
-    "contact_finding",
     "contact_rows",
     "rigid_step",
     "rigid_body",
@@ -21,6 +20,7 @@ WORLDS = (
     "scene_events",
 )
 SHARED = {
+    "iapb.contact.finding",  # contacts of given placements
     "iapb.contact.geometry",  # kinds of shapes, their parameters
     "iapb.contact.laws",  # the record of a step, names of the scene's parts
     "iapb.errors",
@@ -35,6 +35,7 @@ SHARED = {
 READ = {
     "system": {
         "device_mechanism",
+        "finder",
         "frictions",
         "gravity",
         "joint_damping",

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 from iapb import find_scene, load_scene
+from iapb.numerics.schema import blank, quantities
 from iapb.run import ContactTable, EffectRow, ImpactTable, Run
 from iapb.scene.mechanism import mechanism_of
-from iapb.schema import blank, quantities
 
 STEPS, UNTOUCHED = 128, 40
 NAMES = ("peg.x", "peg.y", "peg.theta")

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from iapb import resolve_impact
-from iapb.compiled import block
 from iapb.contact.kernels.impact import ImpactWork, factored_impacts
 from iapb.errors import MissingDependencyError, SolverError, installing
-from iapb.schema import zeros_of
+from iapb.numerics.compiled import block
+from iapb.numerics.schema import zeros_of
 from reference.complementarity import ImpactProblem, solve
 from verification.impacts import ImpactCase
 from verification.methods import gram_pinv

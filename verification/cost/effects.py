@@ -20,11 +20,11 @@ import numpy as np
 
 from iapb import decide_effects, find_scene, load_scene
 from iapb.advice.effects import EFFECT_NAMES
-from iapb.compiled import block
 from iapb.contact.kernels import world as engine
 from iapb.contact.laws import Penalty
 from iapb.errors import IapbError
 from iapb.haptics.coupling import NoCoupling
+from iapb.numerics.compiled import block
 from iapb.scene import Scene, scene_names
 from iapb.simulation import Simulation
 from reference import Floats

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numba import njit
 
-from iapb.linalg import add_multiple, cholesky, dot_of, from_whitened, to_whitened
+from iapb.numerics.linalg import add_multiple, cholesky, dot_of, from_whitened, to_whitened
 from reference.complementarity.solvers.lemke import import_lcp_lemke
 
 lcp_lemke = import_lcp_lemke()

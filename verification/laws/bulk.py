@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 
 from iapb import resolve_impacts
-from iapb.advice.certificate import judge_gains
-from iapb.compiled import block
 from iapb.contact.kernels.impact import ImpactWork, factored_impacts
-from iapb.schema import zeros_of
+from iapb.numerics.compiled import block
+from iapb.numerics.schema import zeros_of
 from reference.exact import bulk_energy_gain
 from reference.one_thread import one_thread
+from verification.certificate import judge_gains
 from verification.impacts import ANY_RANK, EPS, Floats, Impacts, draw_impacts, over
 from verification.methods import COMPARED
 from verification.table import HOLDS, Row

@@ -35,8 +35,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from iapb.advice import certificate
 from reference.complementarity.solution import project_on_cone
+from verification import certificate
 from verification.impacts import (
     Floats,
     ImpactCase,

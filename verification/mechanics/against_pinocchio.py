@@ -26,8 +26,7 @@ from iapb.scene import Scene, load_scene
 from iapb.scene.mechanism import mechanism_of
 from iapb.system import System
 from reference import Floats
-from reference.contact_finding import Contacts, find_contacts
-from reference.contact_rows import contact_jacobian, mechanics_of
+from reference.contact_rows import mechanics_of
 from reference.random_mechanisms import random_inertia, random_mechanism, random_state
 from reference.rigid_body import (
     PinocchioMechanism,
@@ -44,8 +43,6 @@ from verification.table import Row, Table
 # Relative to the largest entry. For chains of 30 links each algorithm is accurate to about 1e-14.
 AGREEMENT = 1e-11
 EARTH = (0.0, 0.0, -9.81)  # [m/s^2]
-# contacts that differ by more are different contacts; rounding of a dozen products is about 1e-14
-SAME = 1e-9
 STATES = 100
 TREE_SIZES = (1, 2, 4, 8, 16, 30)
 TREES = {"quick": 3, "full": 50}  # trees of each size
@@ -364,40 +361,26 @@ IMPULSE_DYNAMICS = Check(
 )
 
 
-# Mechanics and contacts of a scene, by the engine and by the references.
 def scene_difference(scene: Scene, configurations: int = 50, seed: int = 0) -> Row:
-    """Compare the engine's mechanics and narrow phase with Pinocchio and `contact_finding`.
+    """Return the largest differences of a scene's mechanics between the engine and Pinocchio.
 
     The configurations are the initial one of the scene and random ones around it, displaced by 1e-6
-    to 1 [m, rad]. The differences are the largest ones: relative to the largest entry for
-    mechanics, absolute for contacts. "With other contacts" counts configurations whose contacts
-    differ in number or by more than SAME, for instance because two faces are equally close and each
-    side takes another one.
+    to 1 [m, rad]. The differences are relative to the largest entry.
     """
     system, rng = System(scene), np.random.default_rng(seed)
     m, start = system.mechanism, system.make_state().q
-    mechanics, contacts, apart, compared = np.zeros(3), np.zeros(4), 0, 0
+    worst = np.zeros(3)
     for k in range(configurations):
         moved = rng.normal(size=m.nv) * 10.0 ** rng.uniform(-6.0, 0.0) if k else np.zeros(m.nv)
         q, v = m.integrate(start, moved), rng.normal(size=m.nv)
-        mechanics = np.maximum(mechanics, _mechanics_apart(system, q, v))
-        found = _contacts_apart(system, q)
-        if found is None:
-            apart += 1
-        else:
-            contacts, compared = np.maximum(contacts, found[1]), compared + found[0]
-    (mass, inner, frame), (_, normal, gap, row) = mechanics.tolist(), contacts.tolist()
+        worst = np.maximum(worst, _mechanics_apart(system, q, v))
+    mass, inner, frame = worst.tolist()
     return {
         "scene": scene.name,
         "configurations": configurations,
-        "with other contacts": apart,
         "M": mass,
         "B + G": inner,
         "frame Jacobians": frame,
-        "contacts": compared,
-        "gap [m]": gap,
-        "normal": normal,
-        "contact row": row,
     }
 
 
@@ -416,36 +399,3 @@ def _mechanics_apart(system: System, q: Floats, v: Floats) -> list[float]:
             [(np.array([m.frame_jacobian(q, b) for b in range(len(frames))]), frames)]
         ),
     ]
-
-
-def _contacts_apart(system: System, q: Floats) -> tuple[int, Floats] | None:
-    """Number of contacts, and largest differences (4,) of point, normal, gap, row; None if these
-    are other contacts."""
-    axes, origins, frames = mechanics_of(system).bodies(q)
-    theirs = find_contacts(system.shapes, system.pairs, axes, origins, np.inf)
-    found = system.contacts_at(q, np.inf)
-    ours = Contacts(*(getattr(found, name) for name in Contacts._fields))
-    count = len(ours.gap)
-    if count != len(theirs.gap):
-        return None
-    first, second = (
-        (each.point, each.normal, each.gap, contact_jacobian(each.normal, each, origins, frames))
-        for each in (ours, theirs)
-    )
-    worst, left = np.zeros(4), list(range(count))
-    for i in range(count):
-        pair = [
-            j
-            for j in left
-            if theirs.shape_a[j] == ours.shape_a[i] and theirs.shape_b[j] == ours.shape_b[i]
-        ]
-        apart = {
-            j: [float(np.abs(a[i] - b[j]).max()) for a, b in zip(first, second, strict=True)]
-            for j in pair
-        }
-        nearest = min(pair, key=lambda j: max(apart[j]), default=None)
-        if nearest is None or max(apart[nearest]) > SAME:
-            return None
-        worst = np.maximum(worst, apart[nearest])
-        left.remove(nearest)
-    return count, worst

@@ -17,10 +17,10 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from iapb.compiled import kernel
 from iapb.contact.geometry import ENDLESS, HALF_SPACE, POLYGON, Shapes
-from iapb.linalg import add, dot, load, store, subtract, transform
-from iapb.schema import Floats, Indices, Integers, States, blank, quantities
+from iapb.numerics.compiled import kernel
+from iapb.numerics.linalg import add, dot, load, store, subtract, transform
+from iapb.numerics.schema import Floats, Indices, Integers, States, blank, quantities
 
 # Below this number of candidate pairs testing all is as fast: the narrow phase rejects distant
 # pairs early.

@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 
-from iapb.compiled import copy_into, kernel
 from iapb.contact.kernels.contact_set import (
     LEFT,
     STRIKES,
@@ -29,7 +28,8 @@ from iapb.contact.kernels.rows import (
 )
 from iapb.contact.kernels.shape_frames import copy_contact
 from iapb.contact.kernels.unilateral import poisson_impact
-from iapb.linalg import dot_of, load
+from iapb.numerics.compiled import copy_into, kernel
+from iapb.numerics.linalg import dot_of, load
 from iapb.run import COLLIDING
 
 # share of |u|, and of the largest impulse, above which a contact opens or pulls: far above rounding

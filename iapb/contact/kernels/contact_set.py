@@ -3,10 +3,10 @@ rows."""
 
 from __future__ import annotations
 
-from iapb.compiled import kernel
 from iapb.contact.kernels.joint_stops import is_stop
 from iapb.contact.kernels.shape_frames import copy_contact
-from iapb.linalg import dot, load, subtract
+from iapb.numerics.compiled import kernel
+from iapb.numerics.linalg import dot, load, subtract
 from iapb.run import COLLIDING, FREE, RESTING
 
 # Two normals are aligned, and may belong to one surface, when the cosine of their angle is at least

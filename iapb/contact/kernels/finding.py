@@ -3,7 +3,6 @@ grouped."""
 
 from __future__ import annotations
 
-from iapb.compiled import kernel
 from iapb.contact.kernels.broadphase import near_pairs
 from iapb.contact.kernels.contact_set import (
     CLOSE,
@@ -18,7 +17,8 @@ from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.rows import contact_velocities
 from iapb.contact.kernels.seams import leave_out_seams
 from iapb.contact.kernels.shape_frames import copy_contact, copy_found
-from iapb.linalg import load, store
+from iapb.numerics.compiled import kernel
+from iapb.numerics.linalg import load, store
 
 # share of what a contact bent off its support in a step by which the next step may differ
 BENDS = 0.5

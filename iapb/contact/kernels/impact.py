@@ -6,11 +6,11 @@ from __future__ import annotations
 import math
 from typing import Annotated, NamedTuple
 
-from iapb.compiled import copy_into, kernel
 from iapb.contact.kernels.passive import UNIT, passive_step, write_step
 from iapb.contact.kernels.row_basis import orthonormal_basis
-from iapb.double_double import add_product, symmetric_entry
-from iapb.linalg import (
+from iapb.numerics.compiled import copy_into, kernel
+from iapb.numerics.double_double import add_product, symmetric_entry
+from iapb.numerics.linalg import (
     add_multiple,
     cholesky,
     dot_of,
@@ -19,7 +19,7 @@ from iapb.linalg import (
     to_whitened,
     whiten_columns,
 )
-from iapb.schema import Booleans, Floats
+from iapb.numerics.schema import Booleans, Floats
 
 # Two rows that differ by less than this (rows of unit length in the kinetic metric) count as one.
 # The error of restitution is then at most (1 + e) · tolerance · |u|. A larger tolerance would

@@ -21,13 +21,13 @@ from __future__ import annotations
 import math
 from typing import Annotated, NamedTuple
 
-from iapb.compiled import copy_into, kernel
 from iapb.contact.kernels.impact import apply_change, write_change
 from iapb.contact.kernels.row_basis import add_minimum_norm, minimum_norm_factors
 from iapb.contact.kernels.unilateral import push_only
-from iapb.elementary import hypotenuse
-from iapb.linalg import add_multiple, dot_of, orthogonalize
-from iapb.schema import Floats
+from iapb.numerics.compiled import copy_into, kernel
+from iapb.numerics.elementary import hypotenuse
+from iapb.numerics.linalg import add_multiple, dot_of, orthogonalize
+from iapb.numerics.schema import Floats
 
 # share of a tangent's row: a smaller part outside the span of the normal rows is rounding
 GONE = 1e-13

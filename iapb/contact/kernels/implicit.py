@@ -30,10 +30,10 @@ from __future__ import annotations
 import math
 from typing import Annotated, NamedTuple
 
-from iapb.compiled import kernel
 from iapb.contact.kernels.contact_set import LEFT, TOUCHING, contact_before, group_of_contact
 from iapb.contact.kernels.rows import friction_of, tangent_of, twist, write_pair_row
-from iapb.linalg import (
+from iapb.numerics.compiled import kernel
+from iapb.numerics.linalg import (
     add,
     add_multiple,
     cross,
@@ -46,7 +46,7 @@ from iapb.linalg import (
     transform,
     transform_back,
 )
-from iapb.schema import Floats, Integers
+from iapb.numerics.schema import Floats, Integers
 
 STICKING = (
     1e-10  # m/s: a contact that slips more slowly sticks, with a friction in proportion to its slip

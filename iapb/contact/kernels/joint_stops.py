@@ -9,9 +9,9 @@ and records then treat a limit as a contact.
 
 from __future__ import annotations
 
-from iapb.compiled import kernel
 from iapb.contact.kernels.rows import tangent_of
-from iapb.linalg import add, cross, load, scale, store
+from iapb.numerics.compiled import kernel
+from iapb.numerics.linalg import add, cross, load, scale, store
 
 
 @kernel

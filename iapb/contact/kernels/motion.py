@@ -15,21 +15,9 @@ On quaternions and other groups q moves by integrate(q, v, h), never by addition
 
 from __future__ import annotations
 
-from iapb.compiled import copy_into, kernel
 from iapb.contact.kernels.contact_set import group_of_contact
 from iapb.contact.kernels.implicit import is_dry, rest_implicitly
 from iapb.contact.kernels.resting import resting_force
-from iapb.linalg import (
-    add,
-    add_multiple,
-    cholesky,
-    cholesky_tree_blocks,
-    scale,
-    solve_mass,
-    solve_tree_blocks,
-    store,
-    subtract,
-)
 from iapb.mechanics.joints import SPHERICAL
 from iapb.mechanics.kernels.configuration import integrate, integrate_body
 from iapb.mechanics.kernels.dynamics import bias, gravity, mass_matrix
@@ -45,6 +33,18 @@ from iapb.mechanics.kernels.free_motion import (
     to_fixed_axes,
 )
 from iapb.mechanics.kernels.kinematics import forward_kinematics
+from iapb.numerics.compiled import copy_into, kernel
+from iapb.numerics.linalg import (
+    add,
+    add_multiple,
+    cholesky,
+    cholesky_tree_blocks,
+    scale,
+    solve_mass,
+    solve_tree_blocks,
+    store,
+    subtract,
+)
 from iapb.run import COLLIDING
 
 # Above this speed [m/s, rad/s] products of masses, stiffnesses, displacements and speeds may

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 
-from iapb.compiled import kernel
 from iapb.contact.geometry import CIRCLE, HALF_PLANE, HALF_SPACE, SPHERE
 from iapb.contact.kernels.shape_frames import (
     ball_on_surface,
@@ -24,7 +23,8 @@ from iapb.contact.kernels.shape_frames import (
     world_center,
 )
 from iapb.contact.kernels.spatial_pairs import spatial_pair
-from iapb.elementary import hypotenuse
+from iapb.numerics.compiled import kernel
+from iapb.numerics.elementary import hypotenuse
 
 
 @kernel

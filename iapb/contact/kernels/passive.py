@@ -20,8 +20,8 @@ import math
 
 import numpy as np
 
-from iapb.compiled import copy_into, kernel
-from iapb.double_double import least_energy, two_product, two_sum
+from iapb.numerics.compiled import copy_into, kernel
+from iapb.numerics.double_double import least_energy, two_product, two_sum
 
 UNIT = 2.0**-53
 _UNDERFLOW = (

@@ -12,7 +12,6 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from iapb.compiled import copy_into, kernel
 from iapb.contact.kernels.impact import (
     ImpactWork,
     factored_impact,
@@ -23,9 +22,10 @@ from iapb.contact.kernels.impact_friction import FrictionWork, add_impact_fricti
 from iapb.contact.kernels.passive import gain_enclosure, passive_step
 from iapb.contact.kernels.row_basis import minimum_norm_impulses
 from iapb.contact.kernels.unilateral import PushWork, ShareWork, poisson_impact
-from iapb.double_double import kinetic_energies
-from iapb.linalg import add_multiple, all_finite, cholesky, dot_of
-from iapb.schema import Floats, Integers
+from iapb.numerics.compiled import copy_into, kernel
+from iapb.numerics.double_double import kinetic_energies
+from iapb.numerics.linalg import add_multiple, all_finite, cholesky, dot_of
+from iapb.numerics.schema import Floats, Integers
 
 # |M − Mᵀ| up to this share of √(Mᵢᵢ Mⱼⱼ) counts as rounding of the given M. Energies use M as
 # given, in which the skew part cancels; the Cholesky factor is that of the symmetric part.

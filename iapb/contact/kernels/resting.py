@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import math
 
-from iapb.compiled import kernel
 from iapb.contact.kernels.rows import add_body_row, friction_of
-from iapb.linalg import dot, load, scale, store
 from iapb.mechanics.kernels.kinematics import add_point_force
+from iapb.numerics.compiled import kernel
+from iapb.numerics.linalg import dot, load, scale, store
 
 
 @kernel

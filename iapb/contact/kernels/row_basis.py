@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 
-from iapb.compiled import kernel
-from iapb.linalg import add_multiple, dot_of, orthogonalize
+from iapb.numerics.compiled import kernel
+from iapb.numerics.linalg import add_multiple, dot_of, orthogonalize
 
 # A pivot is a residual row of at least this share of the longest one. A short residual has the
 # rounding ε / ‖r‖ in its direction. If only one direction is left, all rows tie, and without this

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 
-from iapb.compiled import kernel
-from iapb.linalg import add, cross, dot, load, scale, store, subtract
+from iapb.numerics.compiled import kernel
+from iapb.numerics.linalg import add, cross, dot, load, scale, store, subtract
 
 # An entry n·j of a row (j: motion of the point per unit rate of one dof) is set to exact zero at
 # and below this share of the numbers it was computed from. Kinematics round by about 2e-16 per

@@ -8,11 +8,11 @@ this wall, and an impact there would stop the body.
 
 from __future__ import annotations
 
-from iapb.compiled import kernel
 from iapb.contact.kernels.joint_stops import is_stop
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.shape_frames import copy_found
-from iapb.linalg import add, dot, load, scale, store
+from iapb.numerics.compiled import kernel
+from iapb.numerics.linalg import add, dot, load, scale, store
 
 # [m] what must be left without the sag; above the rounding of positions, below a sag that matters
 _OVERLAPS = 1e-9

@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import math
 
-from iapb.compiled import kernel
 from iapb.contact.geometry import CIRCLE, HALF_SPACE
-from iapb.elementary import hypotenuse
-from iapb.linalg import add, column, dot, load, scale, store, subtract, transform
+from iapb.numerics.compiled import kernel
+from iapb.numerics.elementary import hypotenuse
+from iapb.numerics.linalg import add, column, dot, load, scale, store, subtract, transform
 
 
 @kernel

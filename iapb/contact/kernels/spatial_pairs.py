@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 
-from iapb.compiled import kernel
 from iapb.contact.geometry import BOX, BOX_PAIR_CONTACTS, HALF_SPACE, SPHERE
 from iapb.contact.kernels.shape_frames import (
     ball_on_surface,
@@ -20,7 +19,8 @@ from iapb.contact.kernels.shape_frames import (
     world_axis,
     world_center,
 )
-from iapb.linalg import add, cross, dot, load, scale, subtract
+from iapb.numerics.compiled import kernel
+from iapb.numerics.linalg import add, cross, dot, load, scale, subtract
 
 
 @kernel

@@ -7,11 +7,11 @@ Where impacts happen at the moment of touch, a step that brings new contacts is 
 
 from __future__ import annotations
 
-from iapb.compiled import copy_into, kernel
 from iapb.contact.kernels.collide import resolve_collisions
 from iapb.contact.kernels.finding import find_contacts
 from iapb.contact.kernels.motion import NOT_POSITIVE_DEFINITE, OK, TOO_MANY_CONTACTS, locate, move
 from iapb.contact.kernels.touch import cut_at_touch, let_go
+from iapb.numerics.compiled import copy_into, kernel
 from iapb.run import COLLIDING, FREE
 
 

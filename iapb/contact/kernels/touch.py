@@ -22,7 +22,6 @@ from __future__ import annotations
 
 import math
 
-from iapb.compiled import copy_into, kernel
 from iapb.contact.kernels.collide import resolve_collisions
 from iapb.contact.kernels.contact_set import (
     CLOSE,
@@ -40,8 +39,9 @@ from iapb.contact.kernels.motion import NOT_POSITIVE_DEFINITE, OK, TOO_MANY_CONT
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.rows import contact_velocities, twist
 from iapb.contact.kernels.shape_frames import copy_all, copy_contact, copy_found
-from iapb.linalg import add, add_multiple, dot, load, store, subtract, transform
 from iapb.mechanics.kernels.kinematics import forward_kinematics
+from iapb.numerics.compiled import copy_into, kernel
+from iapb.numerics.linalg import add, add_multiple, dot, load, store, subtract, transform
 from iapb.run import COLLIDING
 
 MOST = 8  # parts after which a component is cut no more in this step

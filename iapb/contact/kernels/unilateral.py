@@ -11,11 +11,11 @@ from __future__ import annotations
 import math
 from typing import Annotated, NamedTuple
 
-from iapb.compiled import copy_into, kernel
 from iapb.contact.kernels.impact import apply_change, write_change
 from iapb.contact.kernels.row_basis import minimum_norm_factors, orthonormal_basis
-from iapb.linalg import add_multiple, dot_of, orthogonalize
-from iapb.schema import Booleans, Floats, Integers
+from iapb.numerics.compiled import copy_into, kernel
+from iapb.numerics.linalg import add_multiple, dot_of, orthogonalize
+from iapb.numerics.schema import Booleans, Floats, Integers
 
 # A row counts as closing if its speed exceeds this share, times d, of the terms that it is summed
 # from: some times their rounding.

@@ -15,7 +15,7 @@ from iapb.contact.kernels.implicit import RestWork
 from iapb.contact.kernels.unilateral import PushWork, ShareWork
 from iapb.mechanics.kernels.arrays import MechanismArrays, Workspace
 from iapb.mechanics.kernels.free_motion import FreeMotion
-from iapb.schema import Booleans, Floats, Indices, Integers, States
+from iapb.numerics.schema import Booleans, Floats, Indices, Integers, States
 
 
 class Switches(NamedTuple):

@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from iapb.schema import Booleans, Floats, Integers, zeros_of
+from iapb.numerics.schema import Booleans, Floats, Integers, zeros_of
 
 
 class MechanismArrays(NamedTuple):

@@ -7,10 +7,10 @@ motion of SE(3), as in Pinocchio.
 
 from math import sqrt
 
-from iapb.compiled import kernel
-from iapb.elementary import arc_tangent, sine_cosine
-from iapb.linalg import add, cross, dot, scale
 from iapb.mechanics.joints import CONTINUOUS, FREE_FLYER, SPHERICAL
+from iapb.numerics.compiled import kernel
+from iapb.numerics.elementary import arc_tangent, sine_cosine
+from iapb.numerics.linalg import add, cross, dot, scale
 
 # Below this angle [rad] the series of the screw coefficients (two terms kept) is exact to 1e-17,
 # while the closed forms lose digits: 1 - cos keeps eps / angle^2.

@@ -6,8 +6,9 @@ inertias are kept about the composite's own centre of mass, where merging two bo
 positive terms.
 """
 
-from iapb.compiled import kernel
-from iapb.linalg import (
+from iapb.mechanics.joints import FREE_FLYER
+from iapb.numerics.compiled import kernel
+from iapb.numerics.linalg import (
     accumulate,
     add,
     cross,
@@ -19,7 +20,6 @@ from iapb.linalg import (
     transform,
     transform_back,
 )
-from iapb.mechanics.joints import FREE_FLYER
 
 
 @kernel

@@ -5,13 +5,23 @@ Some of them check configurations, which come from the user; no other kernel che
 
 from math import sqrt
 
-from iapb.compiled import kernel
-from iapb.elementary import arc_tangent
-from iapb.linalg import add, all_finite, cholesky, cross, dot, load, scale, solve_mass, subtract
 from iapb.mechanics.joints import FREE_FLYER
 from iapb.mechanics.kernels.configuration import difference, is_vector, own_count, turn_vector
 from iapb.mechanics.kernels.dynamics import bias, body_velocities, mass_matrix, turned_inertia
 from iapb.mechanics.kernels.kinematics import add_point_force, forward_kinematics
+from iapb.numerics.compiled import kernel
+from iapb.numerics.elementary import arc_tangent
+from iapb.numerics.linalg import (
+    add,
+    all_finite,
+    cholesky,
+    cross,
+    dot,
+    load,
+    scale,
+    solve_mass,
+    subtract,
+)
 
 # Tolerance on the length of a given quaternion or (cos, sin) pair: single precision input passes.
 UNIT_TOLERANCE = 1e-6

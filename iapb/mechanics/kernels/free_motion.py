@@ -24,9 +24,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from iapb.compiled import kernel
-from iapb.elementary import sine_cosine
-from iapb.linalg import (
+from iapb.mechanics.joints import FREE_FLYER, PLANAR, SPHERICAL
+from iapb.mechanics.kernels.configuration import integrate_body, turn_quaternion, turn_vector
+from iapb.numerics.compiled import kernel
+from iapb.numerics.elementary import sine_cosine
+from iapb.numerics.linalg import (
     add,
     cross,
     dot,
@@ -38,8 +40,6 @@ from iapb.linalg import (
     transform,
     transform_back,
 )
-from iapb.mechanics.joints import FREE_FLYER, PLANAR, SPHERICAL
-from iapb.mechanics.kernels.configuration import integrate_body, turn_quaternion, turn_vector
 
 STRAIGHT, RIGID, LINKAGE = range(3)
 # rad in a step: below the first, one turn of second order is exact to rounding; beyond the others,

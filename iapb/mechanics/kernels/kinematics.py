@@ -1,8 +1,9 @@
 """Forward kinematics: the pose of every body, and the world axis of every degree of freedom."""
 
-from iapb.compiled import kernel
-from iapb.elementary import sine_cosine
-from iapb.linalg import (
+from iapb.mechanics.joints import CONTINUOUS, FIXED, FREE_FLYER, PLANAR, PRISMATIC, REVOLUTE
+from iapb.numerics.compiled import kernel
+from iapb.numerics.elementary import sine_cosine
+from iapb.numerics.linalg import (
     add,
     column,
     cross,
@@ -14,7 +15,6 @@ from iapb.linalg import (
     transform,
     turn_frame,
 )
-from iapb.mechanics.joints import CONTINUOUS, FIXED, FREE_FLYER, PLANAR, PRISMATIC, REVOLUTE
 
 
 @kernel

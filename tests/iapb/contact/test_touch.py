@@ -9,12 +9,12 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from iapb.advice.certificate import certify
 from iapb.contact.laws import ImpulseAugmented
 from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling
 from iapb.run import Run
 from iapb.scene import scene_from_text
 from iapb.simulation import Simulation, simulate
+from verification.certificate import certify
 
 G = 9.81
 WIDTH, HEIGHT = 0.1, 0.06

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from iapb import resolve_impact
-from iapb.advice.certificate import judge_gains
 from reference.exact import relative_energy_gain
 from reports.evidence.exact_energy import verdict_of_families
+from verification.certificate import judge_gains
 from verification.finding import NOT_TESTABLE, REFUTED, REPRODUCED
 from verification.impacts import ADVERSE_FAMILIES, Impacts, draw_impacts
 from verification.laws import ImpactCase, bulk_impacts

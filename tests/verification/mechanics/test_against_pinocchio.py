@@ -96,22 +96,6 @@ def test_impacts_agree_with_pinocchio_and_another_restitution_does_not(monkeypat
 
 
 @pytest.mark.parametrize("name", scene_names())
-def test_engine_and_reference_find_the_same_contacts(name):
-    """Two codes of other operations agree to rounding on all but a few configurations."""
+def test_the_mechanics_of_the_scenes_are_pinocchios(name):
     found = study.scene_difference(load_scene(find_scene(name)), configurations=30)
-    assert found["with other contacts"] <= 3
     assert max(found[key] for key in ("M", "B + G", "frame Jacobians")) <= 1e-13
-    assert max(found[key] for key in ("gap [m]", "normal", "contact row")) <= 1e-12
-
-
-def test_a_contact_that_is_off_is_noticed(monkeypatch):
-    find = study.find_contacts
-
-    def shifted(*given):
-        return (found := find(*given))._replace(gap=found.gap + 1e-10)
-
-    monkeypatch.setattr(study, "find_contacts", shifted)
-    assert (
-        study.scene_difference(load_scene(find_scene("peg_corner")), configurations=3)["gap [m]"]
-        >= 0.99e-10
-    )

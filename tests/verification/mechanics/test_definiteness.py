@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from iapb.mechanics.mechanism import Mechanism
-from iapb.schema import Floats
+from iapb.numerics.schema import Floats
 from verification.check import Study
 from verification.mechanics import definiteness as study
 

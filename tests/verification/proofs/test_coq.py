@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iapb.advice.certificate import EXPORT_HEAD, exported, judge_gains
+from verification.certificate import EXPORT_HEAD, exported, judge_gains
 from verification.finding import NOT_TESTABLE, REFUTED, REPRODUCED
 from verification.proofs import all_proofs, on_proofs
 from verification.proofs.coq import checked

@@ -1,4 +1,4 @@
-(* The arithmetic under the last step of the resolver (iapb/contact/kernels/passive.py, iapb/double_double.py), in binary64
+(* The arithmetic under the last step of the resolver (iapb/contact/kernels/passive.py, iapb/numerics/double_double.py), in binary64
    with rounding to nearest and gradual underflow, for every size d.
 
    Proved here: [two_sum] is exact; [two_product] is exact where nothing underflows, and within 7/2 of the smallest number
@@ -24,7 +24,7 @@ Definition add x y := rnd (x + y).
 Definition subtract x y := rnd (x - y).
 Definition multiply x y := rnd (x * y).
 
-(* iapb.double_double.two_sum and two_product, operation by operation. *)
+(* iapb.numerics.double_double.two_sum and two_product, operation by operation. *)
 Definition two_sum a b :=
   let s := add a b in
   let t := subtract s a in

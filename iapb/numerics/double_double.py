@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from iapb.compiled import kernel
+from iapb.numerics.compiled import kernel
 
 _SPLITTER = 134217729.0  # 2^27 + 1: halves a 53-bit significand (Dekker)
 

@@ -14,8 +14,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iapb.double_double import add_product, kinetic_energies, quadratic_forms, two_product, two_sum
-from iapb.elementary import arc_tangent, hypotenuse, sine_cosine
+from iapb.numerics.double_double import (
+    add_product,
+    kinetic_energies,
+    quadratic_forms,
+    two_product,
+    two_sum,
+)
+from iapb.numerics.elementary import arc_tangent, hypotenuse, sine_cosine
 
 NUMBERS = np.random.default_rng(8)
 ANGLES = np.concatenate(

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-import iapb.advice.certificate
+import iapb
+import verification.certificate
 from iapb import (
     ArgumentError,
     IapbError,
@@ -21,9 +22,9 @@ from iapb import (
     load_scene,
     simulate,
 )
-from iapb.advice.certificate import exact_gain, judge_gains
 from iapb.contact.laws import ImpulseAugmented
 from iapb.run import Run, digests
+from verification.certificate import exact_gain, judge_gains
 
 
 def elastic(n: int, d: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -97,7 +98,7 @@ def test_a_bound_that_disagrees_with_integers_is_an_error(monkeypatch: pytest.Mo
     def wrong(masses: np.ndarray, before: np.ndarray, after: np.ndarray, signs: np.ndarray) -> None:
         signs[:] = 1
 
-    monkeypatch.setattr(iapb.advice.certificate, "gain_signs", wrong)
+    monkeypatch.setattr(verification.certificate, "gain_signs", wrong)
     with pytest.raises(IapbError, match="outside its double-double bounds"):
         judge_gains(np.eye(2), [[1.0, 1.0]], [[0.5, 0.5]])
 

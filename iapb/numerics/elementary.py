@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import math
 
-from iapb.compiled import kernel
-from iapb.double_double import add_product, two_product, two_sum
+from iapb.numerics.compiled import kernel
+from iapb.numerics.double_double import add_product, two_product, two_sum
 
 # π/2 as an unevaluated sum, and 1/n! as pairs
 _QUARTER = (1.5707963267948966, 6.123233995736766e-17, -1.4973849048591698e-33)

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from numba.core.errors import NumbaError
 
-from iapb.bitcode import BlockType, dispatcher_of
-from iapb.compiled import Block, block, kinds_of
-from iapb.library import library
-from iapb.linalg import cholesky
+from iapb.building.bitcode import BlockType, dispatcher_of
+from iapb.numerics.compiled import Block, block, kinds_of
+from iapb.numerics.library import library
+from iapb.numerics.linalg import cholesky
 
 
 def growing_list(x):
@@ -59,7 +59,7 @@ def test_a_kernel_runs_as_python_for_kinds_of_arguments_that_the_library_has_not
 
 
 WORK = """
-from iapb.compiled import Kernel
+from iapb.numerics.compiled import Kernel
 
 as_python, found_in_library = set(), Kernel.find
 
@@ -73,7 +73,7 @@ Kernel.find = find
 
 import numpy as np
 from iapb import find_scene, load_scene, simulate
-from iapb.advice.certificate import certify
+from verification.certificate import certify
 from iapb.advice.checks import check_scene
 from iapb.contact.impact import resolve_frictional_impact, resolve_impact, resolve_impacts
 from iapb.scene import scene_names

@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from iapb.compiled import kernel
+from iapb.numerics.compiled import kernel
 
 # 3-vectors, rows of (n, 3) arrays, and frames (n, 3, 3): rotations with the axes as columns.
 

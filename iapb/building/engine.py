@@ -1,10 +1,10 @@
-"""Compile the engine's kernels into its library: ``python -m iapb.building``.
+"""Compile the engine's kernels into its library: ``python -m iapb.building.engine.engine``.
 
-The kernels to compile are those that Python calls in a rehearsal (`iapb.rehearsal`). Each one is
+The kernels to compile are those that Python calls in a rehearsal (`iapb.building.rehearsal`). Each one is
 linked with the bitcode of all kernels that it needs, and optimised once as a whole: no other code
 can call those parts, so LLVM inlines most of them and merges repeated loads from a block.
 
-This module and `iapb.bitcode` are the only ones of the engine that need numba.
+This module and `iapb.building.bitcode` are the only ones of the engine that need numba.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from typing import Any
 import llvmlite.binding as llvm
 from numba import typeof, types
 
-from iapb.bitcode import dispatcher_of
-from iapb.compiled import Block, kinds_of
-from iapb.library import MARK, PATH, Library, manifest_of, stamp
-from iapb.rehearsal import Call, rehearsed
+from iapb.building.bitcode import dispatcher_of
+from iapb.building.rehearsal import Call, rehearsed
+from iapb.numerics.compiled import Block, kinds_of
+from iapb.numerics.library import MARK, PATH, Library, manifest_of, stamp
 
 # Cost up to which LLVM inlines a call; with its default of 225 the effects of a step are not
 # inlined. Measured on resting steps: 500 and 1,000 are equally fast; from 5,000 on, a step of the

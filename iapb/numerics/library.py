@@ -25,7 +25,7 @@ import numpy as np
 
 from iapb.errors import IapbError
 
-PACKAGE = Path(__file__).parent
+PACKAGE = Path(__file__).resolve().parents[1]
 PATH = PACKAGE / "engine.so"
 MARK = b"iapb engine library: "  # before the manifest
 NUMBERS = {"int": ctypes.c_int64, "float": ctypes.c_double, "bool": ctypes.c_bool}
@@ -33,7 +33,7 @@ NUMBERS = {"int": ctypes.c_int64, "float": ctypes.c_double, "bool": ctypes.c_boo
 # arguments, and constants that kernels read.
 _DECIDE = (
     "bitcode.py",
-    "building.py",
+    "engine.py",
     "rehearsal.py",
     "compiled.py",
     "library.py",
@@ -164,7 +164,10 @@ def make() -> None:
     print("A file with kernels changed: compiling the engine ...", file=sys.stderr, flush=True)
     started = time.monotonic()
     done = subprocess.run(
-        [sys.executable, "-m", "iapb.building"], cwd=PACKAGE.parent, stdout=sys.stderr, check=False
+        [sys.executable, "-m", "iapb.building.engine"],
+        cwd=PACKAGE.parent,
+        stdout=sys.stderr,
+        check=False,
     )
     if done.returncode:
         raise IapbError(

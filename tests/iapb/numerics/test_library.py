@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import iapb.run
-from iapb.library import PATH, manifest_of, sources, stamp
+from iapb.numerics.library import PATH, manifest_of, sources, stamp
 
 ENGINE = Path(iapb.run.__file__).parent
 FIRST = "import iapb; print(iapb.resolve_impact([[1.0]], [[1.0]], [-1.0], 0.5).velocity[0])"
@@ -37,7 +37,7 @@ def test_an_installed_library_is_used_as_it_is(installed: Path) -> None:
 
 
 def changed_source(package: Path) -> None:
-    kernels = package / "linalg.py"
+    kernels = package / "numerics" / "linalg.py"
     kernels.write_text(kernels.read_text().replace("+", "-", 1))
 
 
@@ -72,7 +72,13 @@ def test_the_stamp_covers_every_file_whose_constants_kernels_read() -> None:
     stamped = set(sources())
     assert stamped >= {
         ENGINE / name
-        for name in ("contact/geometry.py", "run.py", "bitcode.py", "building.py", "library.py")
+        for name in (
+            "contact/geometry.py",
+            "run.py",
+            "building/bitcode.py",
+            "building/engine.py",
+            "numerics/library.py",
+        )
     }
     kernels = [path for path in stamped if b"@kernel" in path.read_bytes()]
     for path in kernels:

@@ -11,17 +11,17 @@ from typing import Any
 
 import numpy as np
 
-from iapb.advice.certificate import certify, certify_impacts
-from iapb.compiled import Kernel, block, kinds_of
 from iapb.contact.impact import resolve_impact
 from iapb.contact.kernels.impact import ImpactWork, factored_impacts
+from iapb.contact.kernels.passive import gain_signs
 from iapb.haptics.coupling import UnilateralCoupler
 from iapb.haptics.device import SimulatedDevice
-from iapb.linalg import product
 from iapb.mechanics.mechanism import Mechanism
 from iapb.mechanics.rotations import angles_of
+from iapb.numerics.compiled import Kernel, block, kinds_of
+from iapb.numerics.linalg import product
+from iapb.numerics.schema import zeros_of
 from iapb.scene import scene_from_text
-from iapb.schema import zeros_of
 from iapb.simulation import Simulation, simulate
 
 BALL_ON_FLOOR = """
@@ -75,9 +75,7 @@ def rehearsed() -> list[Call]:
 def _perform() -> None:
     """Ask everything of the engine that Python asks of it."""
     scene = scene_from_text(BALL_ON_FLOOR)
-    run = simulate(scene)
-    certify(run)
-    _ = run.energy
+    _ = simulate(scene).energy
     device = SimulatedDevice(np.eye(3), np.zeros(3), dt=0.001)
     simulation = Simulation(scene, coupling=GAINS, device=device)
     simulation.step()
@@ -89,7 +87,7 @@ def _perform() -> None:
 def _impacts() -> None:
     v = np.array([-1.0, -1.0])
     resolve_impact(np.eye(2), np.eye(2), v, 0.5)
-    certify_impacts(np.eye(2), v[None], -v[None])
+    gain_signs(np.eye(2)[None], v[None], -v[None], np.empty(1, np.int64))
     work = block(zeros_of(ImpactWork, velocity=2, row=2))
     many = np.eye(2)[None], np.eye(2)[None], v[None], np.ones(1)
     factored_impacts(*many, 2, True, 1, work, np.empty((1, 2)), np.empty(1))
@@ -101,6 +99,7 @@ def _mechanics(body: Mechanism) -> None:
     body.difference(q, body.integrate(q, v))
     body.poses(q[None], planar=True)
     body.mass_matrix(q)
+    body.mass_matrices(q[None])
     body.bias(q, v)
     body.gravity(q, g)
     body.inverse_dynamics(q, v, v, g)

@@ -30,7 +30,7 @@ from numba.extending import (
     typeof_impl,
 )
 
-from iapb.compiled import Block, Kernel
+from iapb.numerics.compiled import Block, Kernel
 
 WORD = ir.IntType(64)
 

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from iapb.library import library, words_of_array
+from iapb.numerics.library import library, words_of_array
 
 AS_PYTHON = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 

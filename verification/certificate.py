@@ -23,10 +23,10 @@ from iapb.contact.impact import real_numbers
 from iapb.contact.kernels.passive import gain_signs
 from iapb.contact.laws import ENGINE_LAWS, ImpulseAugmented
 from iapb.errors import ArgumentError, IapbError
+from iapb.numerics.schema import Booleans, Floats, Integers
 from iapb.run import Run, digests
 from iapb.scene.mechanism import mechanism_of, pairs_of, restitutions_of, shapes_of
 from iapb.scene.reading import scene_from_values
-from iapb.schema import Booleans, Floats, Integers
 
 Batch = tuple[
     Floats, Floats, Floats, Floats | None
