@@ -68,7 +68,9 @@ class ArgumentError(IapbError, ValueError):
     """An argument of a public function has an invalid value."""
 
     def __init__(self, argument: str, value: Any, expected: str) -> None:
-        self.argument, self.value, self.expected = argument, value, expected
+        self.argument = argument
+        self.value = value
+        self.expected = expected
         super().__init__(f"{argument} = {shown(value)}: expected {expected}")
 
 

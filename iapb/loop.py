@@ -20,7 +20,12 @@ FAILURES = STATUS_TEXT | {
     "for this coupling and delay"
 }
 
-COUPLE, ADVANCE, RENDER, MOVE, WRITE = 1, 2, 4, 8, 16  # parts of a step
+# parts of a step
+COUPLE = 1
+ADVANCE = 2
+RENDER = 4
+MOVE = 8
+WRITE = 16
 WHOLE = COUPLE | ADVANCE | RENDER | MOVE | WRITE
 
 # Arrays that the loop writes; poses, energies and digests of M are computed from them.
@@ -97,24 +102,36 @@ def write_step(record, k, step, state, port):
 
 @kernel
 def _write_tables(record, step, state):
-    line, contacts, m = record.contacts, state.contacts, record.used[1]
+    line = record.contacts
+    contacts = state.contacts
+    m = record.used[1]
     for i in range(state.contact_count[0]):
-        line.body_a[m], line.body_b[m] = contacts.body_a[i], contacts.body_b[i]
+        line.body_a[m] = contacts.body_a[i]
+        line.body_b[m] = contacts.body_b[i]
         store(line.point, m, load(contacts.point, i))
         store(line.normal, m, load(contacts.normal, i))
         store(line.friction_force, m, load(contacts.friction_force, i))
-        line.gap[m], line.normal_velocity[m] = contacts.gap[i], contacts.normal_velocity[i]
+        line.gap[m] = contacts.gap[i]
+        line.normal_velocity[m] = contacts.normal_velocity[i]
         line.normal_force[m] = contacts.normal_force[i]
-        line.impulse[m], line.is_new[m] = state.contact_impulse[i], contacts.is_new[i]
+        line.impulse[m] = state.contact_impulse[i]
+        line.is_new[m] = contacts.is_new[i]
         m += 1
     record.used[1] = m
-    impact, log, m = record.impacts, state.impacts, record.used[2]
+    impact = record.impacts
+    log = state.impacts
+    m = record.used[2]
     for i in range(log.logged[0]):
-        impact.step[m], impact.group[m] = step, log.group[i]
-        impact.rows[m], impact.rank[m] = log.rows[i], log.rank[i]
-        impact.scale[m], impact.clamp[m] = log.scale[i], log.clamp[i]
-        impact.energy_lost[m], impact.friction_share[m] = log.energy_lost[i], log.friction_share[i]
-        impact.approaching[m], impact.solved[m] = log.approaching[i], log.solved[i]
+        impact.step[m] = step
+        impact.group[m] = log.group[i]
+        impact.rows[m] = log.rows[i]
+        impact.rank[m] = log.rank[i]
+        impact.scale[m] = log.scale[i]
+        impact.clamp[m] = log.clamp[i]
+        impact.energy_lost[m] = log.energy_lost[i]
+        impact.friction_share[m] = log.friction_share[i]
+        impact.approaching[m] = log.approaching[i]
+        impact.solved[m] = log.solved[i]
         impact.time[m] = log.time[i]
         copy_into(impact.q[m], log.q[i])
         copy_into(impact.v_minus[m], log.v_minus[i])

@@ -57,7 +57,9 @@ class Recorder:
 
     def __init__(self, simulation: Any, every: int = 1) -> None:
         self.simulation = simulation
-        port, state, system = simulation.port, simulation.state, simulation.system
+        port = simulation.port
+        state = simulation.state
+        system = simulation.system
         self.start = {
             "q": state.q.copy(),
             "v": state.v.copy(),
@@ -120,7 +122,8 @@ class Recorder:
         self._at_first = self._at_first or (at_first, energy_at_first)
         self._before = last_of(ledger, self._before)
         self.start = {each.name: getattr(piece, each.name)[-1].copy() for each in STATES}
-        self.records, self.first = [], self.steps
+        self.records = []
+        self.first = self.steps
         return piece
 
     def joined(self, lines: str) -> dict[str, Any]:
@@ -143,19 +146,20 @@ class Recorder:
 
     def _held(self, world: str, stopped: str) -> Run:
         """Return the steps held as a Run."""
-        simulation, system = self.simulation, self.simulation.system
-        law, coupling, scene, mechanism = (
-            simulation.law,
-            simulation.coupling,
-            simulation.scene,
-            system.mechanism,
-        )
-        steps, impacts = self.joined("steps"), self.joined("impacts")
+        simulation = self.simulation
+        system = self.simulation.system
+        law = simulation.law
+        coupling = simulation.coupling
+        scene = simulation.scene
+        mechanism = system.mechanism
+        steps = self.joined("steps")
+        impacts = self.joined("impacts")
         offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(steps.pop("contact_count"))])
         if not simulation.compiled:  # a law written in Python logs no configuration
             impacts["q"] = steps["q"][impacts["step"] - self.first]
         impacts["time"] += impacts["step"] * system.dt
-        ledger, planar = self._ledger, not isinstance(scene, SpatialScene)
+        ledger = self._ledger
+        planar = not isinstance(scene, SpatialScene)
         later: dict[str, Any] = {
             "scene_source": Later(lambda run: scene.source_text),
             "scene_resolved": Later(lambda run: scene.resolved()),

@@ -23,7 +23,10 @@ from iapb.errors import name_the_extra
 from iapb.lazy import extension, needed
 from iapb.numerics.schema import Booleans, Floats, Integers, Quantity, States, quantities, quantity
 
-FREE, COLLIDING, RESTING = 0, 1, 2  # contact states of the paper, section III
+# contact states of the paper, section III
+FREE = 0
+COLLIDING = 1
+RESTING = 2
 UNSOLVED = (
     "resting contact was not solved to rounding, and velocities were shortened"  # begins a remark
 )
@@ -429,7 +432,8 @@ def coordinates_of(
 
 def _labels_along(run: Run, dimension: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return names and units along a dimension; both are empty for dimensions without labels."""
-    q, v = slice(*run.tool_coordinates), slice(*run.tool_dofs)
+    q = slice(*run.tool_coordinates)
+    v = slice(*run.tool_dofs)
     planar = run.pose.shape[-1] == 3
     return {
         "coordinate": (run.coordinate_names, run.coordinate_units),

@@ -140,7 +140,8 @@ class Simulation:
         """
         if hand_force is not None:
             self.hold(hand_force)
-        state, port = self.state, self.port
+        state = self.state
+        port = self.port
         if self._planned:
             port.wrench[:] = wrench_of(self.scene, (self.steps_done + 0.5) * self.system.dt)
         moved = MOVE if self.link is None else 0
@@ -178,13 +179,15 @@ class Simulation:
         force = np.zeros(0) if given is None else given.astype(np.float64)
         if force.shape not in ((3,), (6,)) or not np.all(np.isfinite(force)):
             raise ArgumentError("hand_force", hand_force, "3 (plane) or 6 (space) finite numbers")
-        self._planned, self.port.wrench[:] = False, 0.0
+        self._planned = False
+        self.port.wrench[:] = 0.0
         self.port.wrench[[0, 1, 5] if force.shape == (3,) else slice(None)] = force
 
     def _take(self, result: StepResult) -> None:
         """Copy the result of a law written in Python into the state that the device and the record
         read."""
-        state, law = self.state, f"the law {self.law.name!r} returned"
+        state = self.state
+        law = f"the law {self.law.name!r} returned"
         if not isinstance(result, StepResult):
             raise ArgumentError(f"{law} result", result, "a StepResult")
         if result.state not in (FREE, COLLIDING, RESTING):
@@ -309,7 +312,8 @@ def simulate(
     if law is None and (world or coupling is None):
         world = world or "IAPB"
         chosen = find_world(world)
-        law, coupling = chosen.law, chosen.coupling_in(scene) if coupling is None else coupling
+        law = chosen.law
+        coupling = chosen.coupling_in(scene) if coupling is None else coupling
     if is_engine(law):
         if every != 1:
             raise ArgumentError("every", every, f"1: {law.name} records every step")

@@ -76,7 +76,9 @@ class System:
         self.dt = 1.0 / scene.rate
         self.gravity = np.array([*(scene.gravity or ()), 0.0, 0.0, 0.0])[:3]
         self.tangents = 2 if isinstance(scene, SpatialScene) else 1
-        self.tool_tree, self.tool_dofs, self.tool_coordinates = -1, (0, 0), (0, 0)
+        self.tool_tree = -1
+        self.tool_dofs = (0, 0)
+        self.tool_coordinates = (0, 0)
         if scene.hand is not None:
             trees = self.mechanism.tree_of_body
             self.tool_tree = int(trees[self.mechanism.index(scene.hand.body)])
@@ -112,19 +114,15 @@ class System:
 
         `effects` is the result of `decide` for the law and any coupling.
         """
-        scene, contact, mechanism, law = (
-            self.scene,
-            self.scene.contact,
-            self.mechanism,
-            law.within(self.scene),
-        )
+        scene = self.scene
+        contact = self.scene.contact
+        mechanism = self.mechanism
+        law = law.within(self.scene)
         key = law.impulses, law.integrator, law.rendering, law.friction_in_impacts, law.pushing
         if key in self._worlds:
             return self._worlds[key]
-        limit, on = (
-            np.full(mechanism.nv, np.inf),
-            active_names(self.decide(law) if effects is None else effects),
-        )
+        limit = np.full(mechanism.nv, np.inf)
+        on = active_names(self.decide(law) if effects is None else effects)
         scaled = "device_limits" in on and law.rendering in ("scale", "spread")
         if scaled and scene.device is not None:
             limit[slice(*self.tool_dofs)] = scene.device.force_limit
@@ -199,8 +197,13 @@ class System:
 
     def make_state(self) -> Any:
         """Return a new state at the scene's start."""
-        scene, contact, mechanism, c = self.scene, self.scene.contact, self.mechanism, self.capacity
-        trees, d, tangents = len(mechanism.tree_dofs), mechanism.nv, self.tangents
+        scene = self.scene
+        contact = self.scene.contact
+        mechanism = self.mechanism
+        c = self.capacity
+        trees = len(mechanism.tree_dofs)
+        d = mechanism.nv
+        tangents = self.tangents
         largest = max((stop - start for start, stop in mechanism.tree_dofs), default=0)
         per_body = contact.self_collision_rows == "per_body"
         rows = c * (2 if per_body else 1)  # (13)-(14): two each
@@ -264,7 +267,8 @@ class System:
         _factored(state.mass_matrix, state.lower)
         state.group_of_tree[:] = state.island_of_tree[:] = np.arange(trees)
         state.located_q[:] = np.nan
-        state.h[:], state.moving[:] = self.dt, True
+        state.h[:] = self.dt
+        state.moving[:] = True
         state.cut.arriving[:] = state.cut.whole[:] = -1
         return block(state)
 
@@ -278,7 +282,10 @@ class System:
         `external` device moves by itself: its delay and sensor resolution are its own, so the port
         adds neither.
         """
-        scene, hand, settings, d = self.scene, self.scene.hand, self.scene.device, self.mechanism.nv
+        scene = self.scene
+        hand = self.scene.hand
+        settings = self.scene.device
+        d = self.mechanism.nv
         if hand is None and not isinstance(coupling, NoCoupling):
             raise ArgumentError(
                 "coupling", coupling.name, f"none: scene {scene.name} has no hand, so no device"
@@ -286,7 +293,8 @@ class System:
         on = active_names(self.decide(ImpulseAugmented(), coupling) if effects is None else effects)
         on -= {"delay", "quantisation"} if external else set()
         device = self.mechanism if hand is None else self.device_mechanism()
-        (v_start, v_stop), (q_start, q_stop) = self.tool_dofs, self.tool_coordinates
+        (v_start, v_stop) = self.tool_dofs
+        (q_start, q_stop) = self.tool_coordinates
         lengths = {
             "velocity": d,
             "tool": v_stop - v_start,

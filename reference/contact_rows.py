@@ -84,10 +84,13 @@ def _solids_of(system: Any) -> _Solids:
 
 
 def _corners_and_faces(shapes: Shapes) -> _Solids:
-    corners, points, normals = list[Floats](), list[Floats](), list[Floats]()
+    corners = list[Floats]()
+    points = list[Floats]()
+    normals = list[Floats]()
     for s, kind in enumerate(shapes.kind):
         middle = shapes.center[s]
-        corner, normal = middle[None], np.zeros((0, 3))
+        corner = middle[None]
+        normal = np.zeros((0, 3))
         if kind == POLYGON:
             rows = slice(shapes.first[s], shapes.first[s] + shapes.count[s])
             corner = np.pad(shapes.vertices[rows], ((0, 0), (0, 1)))
@@ -170,17 +173,19 @@ def _with_stops(
     stops = system.stops
     gap = stops.arm * stops.sign * (q[stops.coordinate] - stops.bound)
     kept = np.flatnonzero(gap <= margin)
-    body, parent, dof = stops.body[kept], stops.parent[kept], stops.dof[kept]
-    turning, sliding = (
-        frames[body, 3:, dof],
-        frames[body, :3, dof],
-    )  # relative to the parent, at unit joint velocity
+    body = stops.body[kept]
+    parent = stops.parent[kept]
+    dof = stops.dof[kept]
+    # relative to the parent, at unit joint velocity
+    turning = frames[body, 3:, dof]
+    sliding = frames[body, :3, dof]
     turns = np.linalg.norm(turning, axis=1) > 0.5
     axis = np.where(turns[:, None], turning, sliding)
     lever = unit_tangents(axis, spatial=True)[:, 0]
     normal = np.where(turns[:, None], np.cross(axis, lever), axis) * stops.sign[kept, None]
     point = origins[body] + np.where(turns, stops.arm[kept], 0.0)[:, None] * lever
-    shape, feature = stops.shape[kept].astype(np.int32), np.zeros(len(kept), np.int64)
+    shape = stops.shape[kept].astype(np.int32)
+    feature = np.zeros(len(kept), np.int64)
     own = (
         shape,
         shape,
@@ -211,19 +216,21 @@ def contact_jacobian(
 
 @numba.njit(cache=True, fastmath=False)
 def _rows(directions, points, bodies_a, bodies_b, origins, frames):  # type: ignore[no-untyped-def]
-    count, d = len(directions), frames.shape[2]
-    rows, along = np.zeros((count, d)), np.empty(6)
+    count = len(directions)
+    d = frames.shape[2]
+    rows = np.zeros((count, d))
+    along = np.empty(6)
     for c in range(count):
-        n, size, length = directions[c], 0.0, 0.0
+        n = directions[c]
+        size = 0.0
+        length = 0.0
         for side in range(2):
             body, sign = (bodies_a[c], 1.0) if side == 0 else (bodies_b[c], -1.0)
             x, y, z = points[c] - origins[body]
             along[:3] = n
-            along[3], along[4], along[5] = (
-                y * n[2] - z * n[1],
-                z * n[0] - x * n[2],
-                x * n[1] - y * n[0],
-            )
+            along[3] = y * n[2] - z * n[1]
+            along[4] = z * n[0] - x * n[2]
+            along[5] = x * n[1] - y * n[0]
             for k in range(d):
                 for i in range(6):
                     rows[c, k] += sign * along[i] * frames[body, i, k]
@@ -283,7 +290,9 @@ def write_contacts(
     blow, pushed : (c,) impulses [N s]; `pushed` is recorded as forces
     friction : (c, 3) tangential impulses in world axes, recorded as forces
     """
-    into, geometry, before = state.contacts, found.geometry, int(state.contact_count[0])
+    into = state.contacts
+    geometry = found.geometry
+    before = int(state.contact_count[0])
     new = ~lasting(state, found)
     kept = np.flatnonzero(~(found.gap > 0.0) | (blow > 0.0) | (pushed > 0.0))
     columns = {
@@ -309,12 +318,13 @@ def write_impact(
     if not len(rows):
         return
     change = np.linalg.solve(mass, impulse)
-    log.group[0], log.rows[0], log.rank[0] = (
-        max(system.tool_tree, 0),
-        len(rows),
-        np.linalg.matrix_rank(rows),
-    )
-    log.scale[0], log.clamp[0] = 1.0, 1.0
-    log.v_minus[0], log.v_plus[0], log.impulse[0] = v, v + change, impulse
+    log.group[0] = max(system.tool_tree, 0)
+    log.rows[0] = len(rows)
+    log.rank[0] = np.linalg.matrix_rank(rows)
+    log.scale[0] = 1.0
+    log.clamp[0] = 1.0
+    log.v_minus[0] = v
+    log.v_plus[0] = v + change
+    log.impulse[0] = impulse
     log.energy_lost[0] = -float((v + 0.5 * change) @ impulse)
     log.logged[0] = 1

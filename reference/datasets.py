@@ -44,7 +44,9 @@ _LARGEST_TEXT = (
     64 << 20
 )  # unpacked bytes, enough for 2,500 unknowns; a small gzip file can unpack to any size
 _BLOCK = 256  # columns of M⁻¹ H at a time: 25 MB for 12,000 coordinates
-_COLUMNS, _ROWS = -1, -2  # nz of compressed columns and compressed rows; nz >= 0 counts triplets
+# nz of compressed columns and compressed rows; nz >= 0 counts triplets
+_COLUMNS = -1
+_ROWS = -2
 
 
 class DatasetError(IapbError, ValueError):
@@ -136,7 +138,9 @@ def _lcp(path: Path) -> StoredProblem:
 
 def _siconos_lcp(path: Path) -> StoredProblem:
     n, flag, *words = _text(path).split()
-    sizes, numbers = words[:4], words[4 : 4 + int(n) * (int(n) + 1)]  # a remark may follow
+    # a remark may follow
+    sizes = words[:4]
+    numbers = words[4 : 4 + int(n) * (int(n) + 1)]
     if int(flag) != 0 or sizes != [n] * 4:
         raise ValueError(
             f"storage flag {flag}, sizes {sizes}: expected flag 0 (dense) and four times {n}"
@@ -178,7 +182,8 @@ def _condensed(budget: Budget, group: Any, given: dict[str, Any]) -> ImpactProbl
 
     mass = _matrix(budget, group_at(group, "M"), LARGEST_MATRIX)
     h = _matrix(budget, group_at(group, "H"), LARGEST_MATRIX)
-    f, w = _numbers(budget, group, "vectors/f"), _numbers(budget, group, "vectors/w")
+    f = _numbers(budget, group, "vectors/f")
+    w = _numbers(budget, group, "vectors/w")
     if len(w) > LARGEST_SIZE or h.shape != (len(f), len(w)):
         raise ValueError(
             f"H {h.shape}, f {f.shape}, w {w.shape}: expected at most {LARGEST_SIZE} unknowns"
@@ -211,11 +216,9 @@ def _matrix(budget: Budget, group: Any, most: int) -> Any:
     from scipy import sparse
 
     m, n, nz = (index(_numbers(budget, group, key, None).item()) for key in ("m", "n", "nz"))
-    i, p, x = (
-        _numbers(budget, group, "i", None),
-        _numbers(budget, group, "p", None),
-        _numbers(budget, group, "x"),
-    )
+    i = _numbers(budget, group, "i", None)
+    p = _numbers(budget, group, "p", None)
+    x = _numbers(budget, group, "x")
     if not (0 <= m <= most and 0 <= n <= most):
         raise ValueError(f"{group.name} of {m} x {n}: expected at most {most} rows and columns")
     if nz in (_ROWS, _COLUMNS):

@@ -44,7 +44,8 @@ class LinearSystem:
     def __post_init__(self) -> None:
         for name in ("mass_matrix", "force", "rows", "start"):
             object.__setattr__(self, name, np.array(getattr(self, name), np.float64))
-        d, c = len(self.force), len(self.start)
+        d = len(self.force)
+        c = len(self.start)
         if self.rows.shape != (c, d) or self.mass_matrix.shape != (d, d):
             raise ArgumentError(
                 "rows", self.rows.shape, f"shape ({c}, {d}), mass_matrix ({d}, {d})"
@@ -96,18 +97,23 @@ def event_driven(
     most_events : number of events after which the motion ends early, as where impacts accumulate (a
         ball that comes to rest); `end` is its last time
     """
-    at, moving, now = np.array(q, np.float64), np.array(v, np.float64), 0.0
+    at = np.array(q, np.float64)
+    moving = np.array(v, np.float64)
+    now = 0.0
     free = np.asarray(np.linalg.solve(system.mass_matrix, system.force), np.float64)
-    speed, arcs = float(np.abs(moving).max(initial=0.0)), []
+    speed = float(np.abs(moving).max(initial=0.0))
+    arcs = []
     for _ in range(most_events):
-        gaps, impulse = system.gap(at), np.zeros(len(system.start))
+        gaps = system.gap(at)
+        impulse = np.zeros(len(system.start))
         closed = gaps <= _CLOSED * (1.0 + np.abs(at).max())
         rows = system.rows[closed]
         if (rows @ moving < -_AT_REST * speed).any():
             outcome = law(
                 ImpactProblem.from_impact(system.mass_matrix, rows, moving, system.restitution)
             )
-            moving, impulse[closed] = outcome.velocity, outcome.impulse
+            moving = outcome.velocity
+            impulse[closed] = outcome.impulse
         # resting contacts are kept from closing
         resting = closed & (np.abs(system.rows @ moving) <= _AT_REST * speed)
         a = nearest_velocity(
@@ -121,7 +127,9 @@ def event_driven(
         if now + wait >= duration:
             now = duration
             break
-        at, moving, now = at + wait * (moving + 0.5 * wait * a), moving + wait * a, now + wait
+        at = at + wait * (moving + 0.5 * wait * a)
+        moving = moving + wait * a
+        now = now + wait
         speed = max(speed, float(np.abs(moving).max()))
     time, qs, vs, accelerations, impulses = (np.array(part) for part in zip(*arcs, strict=True))
     return ExactTrajectory(time, qs, vs, accelerations, impulses, now)

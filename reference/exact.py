@@ -34,7 +34,8 @@ _SPLITTER = 134217729.0  # 2^27 + 1: splits a double into two halves whose produ
 _ROUNDING = 2.0**-100  # bound of the error of one double-double operation, which is below 2^-102
 # Beyond these magnitudes the halves or the error terms leave the range of doubles; use exact
 # arithmetic then.
-_SMALLEST, _LARGEST = 1e-60, 1e60
+_SMALLEST = 1e-60
+_LARGEST = 1e60
 
 
 @dataclass(frozen=True)
@@ -77,12 +78,11 @@ def exact_impact(
     ArgumentError
         An entry is not finite, or the shapes do not fit.
     """
-    mass, v = rational_matrix("mass_matrix", mass_matrix), rational_matrix("velocity", velocity)
+    mass = rational_matrix("mass_matrix", mass_matrix)
+    v = rational_matrix("velocity", velocity)
     jacobian = rational_matrix("contact_jacobian", contact_jacobian, mass.ncols())
-    e, chosen = (
-        rational_matrix("restitution", np.array([restitution]))[0, 0],
-        independent_rows(contact_jacobian),
-    )
+    e = rational_matrix("restitution", np.array([restitution]))[0, 0]
+    chosen = independent_rows(contact_jacobian)
     impulse = v - v
     if chosen:
         rows = type(mass)(
@@ -132,7 +132,9 @@ def relative_energy_gain(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: Arr
     """
     mass = _whole_numbers("mass_matrix", mass_matrix)
     v, v_after = _whole_numbers("velocities", [v_minus, v_plus])
-    before, after = v @ mass @ v, v_after @ mass @ v_after  # ½ and both units cancel
+    # ½ and both units cancel
+    before = v @ mass @ v
+    after = v_after @ mass @ v_after
     if before == 0:
         return 0.0 if after == 0 else np.inf
     try:
@@ -174,7 +176,8 @@ def row_condition_number(mass_matrix: ArrayLike, contact_jacobian: ArrayLike) ->
 def rational_matrix(argument: str, value: ArrayLike, columns: int | None = None) -> Rational:
     """Return `value` as a matrix of rationals, exactly; a vector becomes a column (unless `columns`
     is given)."""
-    flint, array = _flint(), np.array(value, dtype=object)
+    flint = _flint()
+    array = np.array(value, dtype=object)
     if array.ndim == 1:
         array = array.reshape(-1, 1) if columns is None else array.reshape(-1, columns)
     if array.ndim != 2 or columns not in (None, array.shape[1]):
@@ -209,7 +212,8 @@ def bulk_energy_gain(
     infinity.
     """
     before, after = (np.atleast_2d(np.asarray(v, np.float64)) for v in (v_minus, v_plus))
-    masses, (n, d) = np.asarray(mass_matrix, np.float64), before.shape
+    masses = np.asarray(mass_matrix, np.float64)
+    (n, d) = before.shape
     if after.shape != before.shape:
         raise ArgumentError("v_plus", after.shape, f"shape {before.shape}, as v_minus")
     if masses.shape not in ((d, d), (n, d, d)):
@@ -222,7 +226,8 @@ def bulk_energy_gain(
             )
             raise ArgumentError(argument, array, expected)
     masses = np.broadcast_to(masses, (n, d, d))
-    difference, total = _two_sum(after, -before), _two_sum(after, before)
+    difference = _two_sum(after, -before)
+    total = _two_sum(after, before)
     change, change_low, size = _bilinear(masses, difference, total)
     if (masses != np.swapaxes(masses, 1, 2)).any():
         turned, turned_low, turned_size = _bilinear(masses, total, difference)
@@ -277,7 +282,8 @@ def _bilinear(
     """Return aᵀ M b (n,) as a double-double, and the sum of |a_i M_ij b_j|, for double-double
     vectors a and b (n, d)."""
     n, d, _ = masses.shape
-    (a_high, a_low), (b_high, b_low) = a, b
+    (a_high, a_low) = a
+    (b_high, b_low) = b
     felt = _multiply(b_high[:, None, :], b_low[:, None, :], masses, 0.0)
     terms = _multiply(a_high[:, :, None], a_low[:, :, None], *felt)
     size = np.abs(terms[0]).sum(axis=(1, 2))

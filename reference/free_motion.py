@@ -41,15 +41,15 @@ def free_motion(
     """
     if not mechanics.has_bias or not np.isfinite(v).all():
         return mechanics.integrate(q, v, dt), v
-    state, left, share = (
-        np.concatenate([q, v]),
-        1.0,
-        1.0,
-    )  # shares of the step; halves, so that sums are exact
+    # shares of the step; halves, so that sums are exact
+    state = np.concatenate([q, v])
+    left = 1.0
+    share = 1.0
     while left > 0.0:
         moved, accurate = _substep(mechanics, state, share * dt)
         if accurate:
-            state, left = moved, left - share
+            state = moved
+            left = left - share
         elif share > _LEAST:
             share *= 0.5
         else:
@@ -63,7 +63,8 @@ def _substep(mechanics: PinocchioMechanism, state: Floats, h: float) -> tuple[Fl
     """Return (q, v) after h [s], and whether the estimated error is small enough."""
     from scipy.integrate import DOP853
 
-    nq, stages = mechanics.nq, np.empty((DOP853.n_stages, len(state)))
+    nq = mechanics.nq
+    stages = np.empty((DOP853.n_stages, len(state)))
     for k, row in enumerate(DOP853.A):
         at = state + h * (row[:k] @ stages[:k]) if k else state
         stages[k, :nq] = mechanics.rate(at[:nq], at[nq:])

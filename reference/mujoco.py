@@ -118,10 +118,14 @@ class MuJoCo:
         data = mujoco.MjData(model)
         set_state(places, data, *scene_parts.start_of(scene))
         total = scene.steps if steps is None else steps
-        qpos, qvel = np.empty((total + 1, model.nq)), np.empty((total + 1, model.nv))
-        qpos[0], qvel[0] = data.qpos, data.qvel
+        qpos = np.empty((total + 1, model.nq))
+        qvel = np.empty((total + 1, model.nv))
+        qpos[0] = data.qpos
+        qvel[0] = data.qvel
         warnings = [getattr(mujoco.mjtWarning, name) for name in UNSTABLE]
-        done, stopped, started = 0, "", time.perf_counter()
+        done = 0
+        stopped = ""
+        started = time.perf_counter()
         try:
             while done < total:
                 self.step(scene, model, data, (done + 0.5) * scene.step)
@@ -129,7 +133,8 @@ class MuJoCo:
                     stopped = f"MuJoCo warns of an unstable simulation at {data.time:g} s"
                     break
                 done += 1
-                qpos[done], qvel[done] = data.qpos, data.qvel
+                qpos[done] = data.qpos
+                qvel[done] = data.qvel
                 if progress is not None and (done % STEPS_BETWEEN_REPORTS == 0 or done == total):
                     progress(done, total)
         except KeyboardInterrupt:
@@ -228,7 +233,8 @@ def spring_restitution(damping_ratio: float) -> float:
 def damping_ratio_of(restitution: float) -> float:
     """Return the damping ratio whose spring has this restitution, between LEAST_RESTITUTION and
     1."""
-    low, high = 0.0, 1.0
+    low = 0.0
+    high = 1.0
     for _ in range(60):
         middle = 0.5 * (low + high)
         if spring_restitution(middle) > restitution:
@@ -262,7 +268,9 @@ def _add_body(parent: Any, body: Body, flat: bool) -> Any:
     rotation, position = body.placement
     made = parent.add_body(name=body.name, pos=position, quat=_quaternion(rotation))
     joint = _mujoco().mjtJoint
-    slide, hinge, ball = joint.mjJNT_SLIDE, joint.mjJNT_HINGE, joint.mjJNT_BALL
+    slide = joint.mjJNT_SLIDE
+    hinge = joint.mjJNT_HINGE
+    ball = joint.mjJNT_BALL
     x, y, z = np.eye(3)
     along = body.joint.unit_axis
     for kind, axis in {
@@ -291,8 +299,10 @@ def _add_body(parent: Any, body: Body, flat: bool) -> Any:
 def _follow(spec: Any, made: dict[str | None, Any], body: Body) -> None:
     """Let a joint follow another one; it starts where the other one says."""
     mimic = body.mimic or Mimic("")
-    follower, leader = made[body.name].joints[0], made[mimic.body].joints[0]
-    follower.name, leader.name = f"{body.name} joint", f"{mimic.body} joint"
+    follower = made[body.name].joints[0]
+    leader = made[mimic.body].joints[0]
+    follower.name = f"{body.name} joint"
+    leader.name = f"{mimic.body} joint"
     spec.add_equality(
         type=_mujoco().mjtEq.mjEQ_JOINT,
         name1=follower.name,
@@ -306,7 +316,8 @@ def _follow(spec: Any, made: dict[str | None, Any], body: Body) -> None:
 def _add_geom(spec: Any, carrier: Any, shapes: Shapes, i: int) -> None:
     """Add shape number i to a body of the model; only the listed pairs touch."""
     kinds = _mujoco().mjtGeom
-    kind, radius = shapes.kind[i], shapes.radius[i]
+    kind = shapes.kind[i]
+    radius = shapes.radius[i]
     corners = shapes.vertices[shapes.first[i] : shapes.first[i] + shapes.count[i]]
     common: dict[str, Any] = {
         "name": f"shape {i}",
@@ -341,7 +352,8 @@ def _add_polygon(spec: Any, carrier: Any, corners: Floats, common: dict[str, Any
     middle = corners.mean(axis=0)
     thick = 0.5 * float(np.linalg.norm(corners - middle, axis=1).max())
     edges = np.roll(corners, -1, axis=0) - corners
-    length, width = np.linalg.norm(edges[0]), np.linalg.norm(edges[1])
+    length = np.linalg.norm(edges[0])
+    width = np.linalg.norm(edges[1])
     opposite = len(corners) == 4 and np.allclose(edges[0], -edges[2], rtol=0.0, atol=1e-12 * length)
     if opposite and abs(edges[0] @ edges[1]) <= 1e-12 * length * width:
         axes = np.eye(3)
@@ -403,7 +415,8 @@ def set_state(places: list[JointPlace], data: Any, q: Floats, v: Floats) -> None
 
 def states_of(places: list[JointPlace], qpos: Floats, qvel: Floats) -> tuple[Floats, Floats]:
     """Return configurations (n, nq) and velocities (n, d) of the scene from MuJoCo's (n, ...)."""
-    q, v = [np.zeros((len(qpos), 0))], []
+    q = [np.zeros((len(qpos), 0))]
+    v = []
     for place in places:
         if place.kind == "follows":
             continue

@@ -48,16 +48,13 @@ def random_mechanism(
         for i in range(joints):
             while len(chain) > 1 and rng.random() < 0.7 * bushy:
                 chain.pop()
-            name, parent, kind = (
-                f"body {tree}.{i}",
-                chain[-1] if chain else None,
-                str(rng.choice(kinds)),
-            )
-            mass, (x, y, z) = 10.0 ** rng.uniform(*MASS_DECADES), rng.normal(size=3).tolist()
-            place, center = (
-                (random_rotation(rng), rng.normal(scale=0.5, size=3)),
-                rng.normal(scale=0.3, size=3),
-            )
+            name = f"body {tree}.{i}"
+            parent = chain[-1] if chain else None
+            kind = str(rng.choice(kinds))
+            mass = 10.0 ** rng.uniform(*MASS_DECADES)
+            (x, y, z) = rng.normal(size=3).tolist()
+            place = (random_rotation(rng), rng.normal(scale=0.5, size=3))
+            center = rng.normal(scale=0.3, size=3)
             bodies.append(
                 Body(
                     name,

@@ -29,7 +29,8 @@ _TURNING = {
     "JointModelFreeFlyer": _FREE_FLYER,
 }
 # A bias below this share of M |v|² in a few motions is rounding error: it is zero in every motion.
-_NO_BIAS, _MOTIONS = 1e-12, 4
+_NO_BIAS = 1e-12
+_MOTIONS = 4
 
 
 _pinocchio = cache(partial(needed, "pinocchio", "The rigid-body reference"))
@@ -50,9 +51,12 @@ class PinocchioMechanism:
     """
 
     def __init__(self, model: Any, followers: Sequence[tuple[int, int, float, float]] = ()) -> None:
-        self.pin, self.model, self.data = _pinocchio(), model, model.createData()
+        self.pin = _pinocchio()
+        self.model = model
+        self.data = model.createData()
         self._below = np.tril_indices(model.nv, -1)
-        spread_q, spread = np.eye(model.nq), np.eye(model.nv)
+        spread_q = np.eye(model.nq)
+        spread = np.eye(model.nv)
         self._offset = np.zeros(model.nq)
         at = [(model.joints[i], model.joints[k], *rest) for i, k, *rest in followers]
         for joint, leader, multiplier, offset in at:
@@ -63,7 +67,8 @@ class PinocchioMechanism:
         self._spread_q = spread_q[:, self._own]
         self._spread = np.delete(spread, [joint.idx_v for joint, *_ in at], axis=1)
         self._follows = bool(at)
-        self.nq, self.nv = len(self._own), self._spread.shape[1]
+        self.nq = len(self._own)
+        self.nv = self._spread.shape[1]
         body = (
             self.pin.FrameType.BODY
         )  # frames of the bodies, in the mechanism's order; the first frame is the world
@@ -109,16 +114,16 @@ class PinocchioMechanism:
         last, the world."""
         self.pin.computeJointJacobians(self.model, self.data, self._at(q))
         self.pin.updateFramePlacements(self.model, self.data)
-        n, world = len(self._bodies), self.pin.LOCAL_WORLD_ALIGNED
-        axes, origins, rows = (
-            np.zeros((n + 1, 3, 3)),
-            np.zeros((n + 1, 3)),
-            np.zeros((n + 1, 6, self.nv)),
-        )
+        n = len(self._bodies)
+        world = self.pin.LOCAL_WORLD_ALIGNED
+        axes = np.zeros((n + 1, 3, 3))
+        origins = np.zeros((n + 1, 3))
+        rows = np.zeros((n + 1, 6, self.nv))
         axes[n] = np.eye(3)
         for b, frame in enumerate(self._bodies):
             placed = self.data.oMf[frame]
-            axes[b], origins[b] = placed.rotation, placed.translation
+            axes[b] = placed.rotation
+            origins[b] = placed.translation
             own = self.pin.getFrameJacobian(self.model, self.data, frame, world)
             rows[b] = own @ self._spread if self._follows else own.reshape(6, self.nv)
         return axes, origins, rows
@@ -210,13 +215,19 @@ def _rates(layout, q, v):  # type: ignore[no-untyped-def]
     for j in range(len(layout) - 1):
         kind, a, b = layout[j]
         if kind == _CONTINUOUS:
-            rate[a], rate[a + 1] = -q[a + 1] * v[b], q[a] * v[b]
+            rate[a] = -q[a + 1] * v[b]
+            rate[a + 1] = q[a] * v[b]
         elif kind in (_SPHERICAL, _FREE_FLYER):
             if kind == _FREE_FLYER:
-                r, w, u = q[a + 3 : a + 6], q[a + 6], v[b : b + 3]
+                r = q[a + 3 : a + 6]
+                w = q[a + 6]
+                u = v[b : b + 3]
                 rate[a : a + 3] = u + 2.0 * np.cross(r, np.cross(r, u) + w * u)
-                a, b = a + 3, b + 3
-            r, w, turn = q[a : a + 3], q[a + 3], v[b : b + 3]
+                a = a + 3
+                b = b + 3
+            r = q[a : a + 3]
+            w = q[a + 3]
+            turn = v[b : b + 3]
             rate[a : a + 3] = 0.5 * (w * turn + np.cross(r, turn))
             rate[a + 3] = -0.5 * (r @ turn)
         else:
@@ -230,7 +241,8 @@ def model_from_urdf(path: str | Path, floating_base: bool = False) -> PinocchioM
     pinocchio = _pinocchio()
     root = (pinocchio.JointModelFreeFlyer(),) if floating_base else ()
     model = pinocchio.buildModelFromUrdf(str(path), *root)
-    read, followers = pinocchio.buildModelFromUrdf(str(path), *root, mimic=True), []
+    read = pinocchio.buildModelFromUrdf(str(path), *root, mimic=True)
+    followers = []
     leaders = {joint.idx_q: i for i, joint in enumerate(read.joints) if joint.nq}
     for i, joint in enumerate(read.joints):
         if joint.shortname() == "JointModelMimic":
@@ -265,8 +277,11 @@ def model_of(mechanism: Mechanism) -> PinocchioMechanism:
         The bodies are not in depth-first order, for which Pinocchio would silently give wrong
         results.
     """
-    pinocchio, chain = _pinocchio(), list[str]()  # from a root to the newest body
-    model, still = pinocchio.Model(), pinocchio.SE3.Identity()
+    # from a root to the newest body
+    pinocchio = _pinocchio()
+    chain = list[str]()
+    model = pinocchio.Model()
+    still = pinocchio.SE3.Identity()
     anchors: dict[str | None, tuple[int, Any]] = {None: (0, still)}
     for body in mechanism.bodies:
         while chain and chain[-1] != body.parent:
@@ -275,8 +290,10 @@ def model_of(mechanism: Mechanism) -> PinocchioMechanism:
             raise ArgumentError("mechanism", body.name, "bodies in depth-first order")
         chain.append(body.name)
         joint, offset = anchors[body.parent]
-        placement, before = offset * pinocchio.SE3(*body.placement), still
-        kind, axis = body.joint.kind, body.joint.unit_axis
+        placement = offset * pinocchio.SE3(*body.placement)
+        before = still
+        kind = body.joint.kind
+        axis = body.joint.unit_axis
         if (
             kind == "continuous"
         ):  # Pinocchio's unbounded joint always rotates about z: turn z to the axis, and back
@@ -334,7 +351,8 @@ def impulse_dynamics(
     restitution : in [-1, 1]
     """
     pinocchio = _pinocchio()
-    rows, v = np.array(contact_jacobian, np.float64), np.array(velocity, np.float64)
+    rows = np.array(contact_jacobian, np.float64)
+    v = np.array(velocity, np.float64)
     model = pinocchio.Model()
     for k in range(len(v)):
         model.addJoint(k, pinocchio.JointModelPX(), pinocchio.SE3.Identity(), f"joint {k}")

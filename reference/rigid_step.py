@@ -62,14 +62,16 @@ CLOSED = 1e-12
 # Active sets cycle for some redundant rows, projections do not.
 STEP_SOLVERS = {"daqp": daqp, "quadprog": quadprog, "gauss_seidel": projected_sweeps}
 SCHEMES = ("automatic", "moreau", "stewart-trinkle")
-NEWTON, POISSON = "Newton", "Poisson"
+NEWTON = "Newton"
+POISSON = "Poisson"
 
 FRICTION_LAWS = ("none", "coulomb", "relaxed")
 # Gauss-Seidel reaches 1e-13 of the velocities if it converges; such a solution is accepted at once.
 # On hyperstatic contacts it converges slowly, and an interior point stops at the square root of its
 # accuracy. Then the best solution is accepted if it reaches the tolerance of
 # `reference.complementarity`.
-CONVERGED, FRICTION_TOLERANCE = 1e-8, SOLVED_TOLERANCE
+CONVERGED = 1e-8
+FRICTION_TOLERANCE = SOLVED_TOLERANCE
 FRICTION_SOLVERS = ("nsgs", "pinocchio_admm", "cvxpy_socp")
 
 
@@ -145,7 +147,8 @@ def rigid_step(
 def _gains(step: RigidStep, contact_jacobian: Floats, gamma_minus: Floats, v_free: Floats) -> bool:
     """Whether the works of the contacts, ½ pᵀ(γ⁻ + γ⁺) and ½ pᵀ(γ_free + γ⁺), are both positive
     beyond rounding."""
-    gamma_plus, gamma_free = contact_jacobian @ step.velocity, contact_jacobian @ v_free
+    gamma_plus = contact_jacobian @ step.velocity
+    gamma_free = contact_jacobian @ v_free
     # includes γ_free, the effect of the load: at rest, γ⁻ is rounding error of either sign
     size = float(step.impulse @ (np.abs(gamma_minus) + np.abs(gamma_free) + np.abs(gamma_plus)))
     work = min(float(step.impulse @ (gamma + gamma_plus)) for gamma in (gamma_minus, gamma_free))
@@ -161,11 +164,13 @@ def nearest_velocity(
     The impulse is that of the first solver whose recomputed residual is at most STEP_TOLERANCE or
     rounding.
     """
-    impulse, kept = np.zeros(len(bound)), np.isfinite(bound)
+    impulse = np.zeros(len(bound))
+    kept = np.isfinite(bound)
     offset = contact_jacobian[kept] @ v_free - bound[kept]
     if (offset >= 0.0).all():  # no contact acts: the common step of free motion
         return RigidStep(v_free, impulse, 0.0)
-    factor, said = _cholesky(mass_matrix), list[str]()
+    factor = _cholesky(mass_matrix)
+    said = list[str]()
     rows = _whitened(factor, contact_jacobian[kept])
     scale = float(np.max(np.abs(contact_jacobian[kept]) @ np.abs(v_free) + np.abs(bound[kept])))
     for name, solver in STEP_SOLVERS.items():
@@ -179,7 +184,8 @@ def nearest_velocity(
         # the largest |min(W_ii p_i, w_i)| [m/s] of 0 <= p ⟂ w = A Aᵀ p + offset >= 0, and the terms
         # that cancel in w
         natural = np.minimum(np.einsum("ij,ij->i", rows, rows) * p, rows @ (rows.T @ p) + offset)
-        residual, sizes = float(np.abs(natural).max(initial=0.0)) / scale, np.abs(rows)
+        residual = float(np.abs(natural).max(initial=0.0)) / scale
+        sizes = np.abs(rows)
         cancelling = float((sizes @ (sizes.T @ np.abs(p))).max(initial=0.0))
         if residual <= max(STEP_TOLERANCE, STEP_ROUNDING * cancelling / scale):
             impulse[kept] = p
@@ -294,7 +300,9 @@ def friction_step(
     blocks = np.concatenate([normal_rows[:, None], tangent_rows], axis=1)
     count, size = blocks.shape[:2]
     mu = np.broadcast_to(np.asarray(friction, np.float64), count)
-    impulse, velocity, taken = np.zeros((count, size)), v_free, np.zeros(count, np.bool_)
+    impulse = np.zeros((count, size))
+    velocity = v_free
+    taken = np.zeros(count, np.bool_)
     while (closing := ~taken & (normal_rows @ velocity < bound)).any():
         taken |= closing
         rows = blocks[taken].reshape(-1, len(v_free))
@@ -312,7 +320,8 @@ def _by_islands(w: Floats, offset: Floats, friction: Floats, relaxed: bool) -> F
     from scipy.sparse.csgraph import connected_components
 
     count, size = offset.shape
-    blocks, impulse = w.reshape(count, size, count, size), np.zeros_like(offset)
+    blocks = w.reshape(count, size, count, size)
+    impulse = np.zeros_like(offset)
     islands, island = connected_components((blocks != 0.0).any(axis=(1, 3)), directed=False)
     for mine in (np.flatnonzero(island == k) for k in range(islands)):
         problem = ImpactProblem.from_delassus(

@@ -80,7 +80,8 @@ _DEPENDENT = (
 )
 # Largest time [s] and largest path [m, rad] of the fourth-order differences for J̇v: rounding and
 # truncation are both near 1e-12, of |v|² where that is large.
-_DIFFERENCE, _PATH = 1e-4, 1e-3
+_DIFFERENCE = 1e-4
+_PATH = 1e-3
 _COMPARED = 11  # instants between two events at which computations are compared
 _AT_ONCE = 100  # most impacts at one instant: Newton's law can leave contacts that approach
 
@@ -142,14 +143,15 @@ class _Motion:
     def __init__(
         self, scene: Scene, coupled: bool, tolerances: Tolerances, duration: float
     ) -> None:
-        self.scene, self.coupled, self.tolerances, self.duration = (
-            scene,
-            coupled,
-            tolerances,
-            duration,
-        )
-        self.system, self.held, self.leaving = System(scene), list[Contact](), list[Contact]()
-        mechanism, self.gains = self.system.mechanism, cast(Any, scene.couplings.four_channel)
+        self.scene = scene
+        self.coupled = coupled
+        self.tolerances = tolerances
+        self.duration = duration
+        self.system = System(scene)
+        self.held = list[Contact]()
+        self.leaving = list[Contact]()
+        mechanism = self.system.mechanism
+        self.gains = cast(Any, scene.couplings.four_channel)
         if scene.hand is not None and scene.hand.changes:
             raise ArgumentError(
                 "scene", scene.name, "a scene whose hand's force does not change over time"
@@ -158,7 +160,9 @@ class _Motion:
             raise ArgumentError("scene", scene.name, "a scene without quaternions, or no coupling")
         if coupled and self.gains is None:
             raise ArgumentError("scene", scene.name, "a scene with couplings.four_channel")
-        self.mechanics, self.d, self.nq = mechanics_of(self.system), mechanism.nv, mechanism.nq
+        self.mechanics = mechanics_of(self.system)
+        self.d = mechanism.nv
+        self.nq = mechanism.nq
         values = self.system.restitutions
         if len(values) > 1:
             found = f"one restitution for all contacts; here {values[0]:g} to {values[-1]:g}"
@@ -170,7 +174,8 @@ class _Motion:
 
     def split(self, state: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """Return q, v, device q, device v of a state, with q normalised."""
-        nq, t = self.nq, self.tool.stop - self.tool.start if self.coupled else 0
+        nq = self.nq
+        t = self.tool.stop - self.tool.start if self.coupled else 0
         both = nq + self.d
         q = self.mechanics.normalize(state[:nq])
         return q, state[nq:both], state[both : both + t], state[both + t :]
@@ -195,10 +200,8 @@ class _Motion:
         if hand is None:
             return np.zeros(mechanics.nv)
         axes, _, rows = (found[mechanics.index(hand.body)] for found in mechanics.bodies(q))
-        moved, wrench = (
-            at_lever(rows, axes @ np.array([*hand.point, 0.0])[:3]),
-            wrench_of(self.scene, 0.0),
-        )
+        moved = at_lever(rows, axes @ np.array([*hand.point, 0.0])[:3])
+        wrench = wrench_of(self.scene, 0.0)
         return np.asarray(moved.T @ wrench[:3] + rows[3:].T @ wrench[3:], np.float64)
 
     def _pull(self, distance: Floats, speed: Floats) -> Floats:
@@ -225,7 +228,8 @@ class _Motion:
             )
             return np.array([(ahead[n][1] - behind[n][1]) @ v / (2.0 * h) for n in names])
 
-        found, h = self.rows(q, v), min(_DIFFERENCE, _PATH / max(float(np.abs(v).max()), 1.0))
+        found = self.rows(q, v)
+        h = min(_DIFFERENCE, _PATH / max(float(np.abs(v).max()), 1.0))
         drift = (4.0 * turning(h) - turning(2.0 * h)) / 3.0
         return _Here(v, mass, free, np.array([found[n][1] for n in names]), drift)
 
@@ -255,7 +259,9 @@ class _Motion:
         ]
         rows = np.array([found[n][1] for n in names]).reshape(len(names), self.d)
         self.widest = max([self.widest, *(found[n][0] for n in names)])
-        mass, impacts, before = self.mechanics.mass_matrix(q), 0, self.held
+        mass = self.mechanics.mass_matrix(q)
+        impacts = 0
+        before = self.held
 
         def pushed(impulse: Floats) -> Floats:
             """Return the device's velocity after a generalized impulse on the tool."""
@@ -272,7 +278,8 @@ class _Motion:
                     f"{self.scene.name}: no reference: more than {_AT_ONCE} impacts at one instant"
                 )
             outcome = newton_lcp(ImpactProblem.from_impact(mass, rows, v, self.restitution))
-            v, device_v = outcome.velocity, pushed(rows.T @ outcome.impulse)
+            v = outcome.velocity
+            device_v = pushed(rows.T @ outcome.impulse)
         lasting = self._lasting(np.concatenate([q, v, device_q, device_v]), names)
         self.held = [n for n, stays in zip(names, lasting, strict=True) if stays]
         self.leaving = [n for n, stays in zip(names, lasting, strict=True) if not stays]
@@ -420,7 +427,9 @@ def _compute(motion: _Motion, most_events: int, start: tuple[Floats, Floats] | N
     """Compute the motion with one set of tolerances."""
     q, v = start or motion.system.start
     device = [q[motion.tool], v[motion.tool]] if motion.coupled else []
-    state, now, duration = np.concatenate([q, v, *device]), 0.0, motion.duration
+    state = np.concatenate([q, v, *device])
+    now = 0.0
+    duration = motion.duration
     segments: list[tuple[float, float, Callable[[float], Floats]]] = []
     events: list[float] = []
     for _ in range(most_events):
@@ -431,11 +440,9 @@ def _compute(motion: _Motion, most_events: int, start: tuple[Floats, Floats] | N
         while opened and now < duration:
             solution = _until_event(motion, state, now)
             segments.append((now, float(solution.t[-1]), solution.sol))
-            now, state, opened = (
-                float(solution.t[-1]),
-                solution.y[:, -1],
-                bool(len(solution.t_events[2])),
-            )
+            now = float(solution.t[-1])
+            state = solution.y[:, -1]
+            opened = bool(len(solution.t_events[2]))
             if opened:
                 found = motion.rows(*motion.split(state)[:2])
                 still = 2.0 * motion.tolerances.closed * (1.0 - _KEPT)
@@ -461,8 +468,11 @@ def _until_event(motion: _Motion, state: Floats, now: float) -> Any:
     found: list[Any] = []
     for event, direction in ((motion.closing, -1.0), (motion.pushing, -1.0), (motion.opening, 1.0)):
         found.append(lambda _time, y, event=event: event(y))
-        found[-1].terminal, found[-1].direction = True, direction  # scipy reads these attributes
-    accuracy, longest = motion.tolerances.accuracy, motion.duration / motion.tolerances.steps
+        # scipy reads these attributes
+        found[-1].terminal = True
+        found[-1].direction = direction
+    accuracy = motion.tolerances.accuracy
+    longest = motion.duration / motion.tolerances.steps
     if (
         motion.leaving
     ):  # no step may skip a whole bounce: after a quarter of its time it has 3/4 of its height

@@ -35,7 +35,8 @@ from reference.rigid_step import FRICTION_LAWS, SCHEMES, friction_step, rigid_st
 MOST_ENTRIES = 50_000_000
 # Measured on AMD EPYC (Zen 4) with 5 to 100 circles and boxes on a floor: 0.13 to 0.9 µs per entry
 # from 50 on.
-SECONDS_A_STEP, SECONDS_AN_ENTRY = 1e-3, 3e-7
+SECONDS_A_STEP = 1e-3
+SECONDS_AN_ENTRY = 3e-7
 
 
 class _Solved(NamedTuple):
@@ -104,7 +105,8 @@ class RigidConstraints:
         A circle or ball has one contact with anything, two boxes in the plane up to two, and in
         space up to eight.
         """
-        kind, d = system.shapes.kind, system.mechanism.nv
+        kind = system.shapes.kind
+        d = system.mechanism.nv
         points = np.where(
             np.isin(kind, (BOX, *ENDLESS)), BOX_CORNERS, np.where(kind == POLYGON, 2, 1)
         )
@@ -131,9 +133,11 @@ class RigidConstraints:
                 f"step; {cost.contacts:,} contacts of {cost.coordinates:,} coordinates have "
                 f"{cost.contacts * cost.coordinates:,}. Fewer bodies, or the world IAPB",
             )
-        mechanics, g = contact_rows.mechanics_of(system), system.gravity
+        mechanics = contact_rows.mechanics_of(system)
+        g = system.gravity
         before = _share_before(system, state) * dt
-        q, v = state.q.copy(), state.v.copy()
+        q = state.q.copy()
+        v = state.v.copy()
         if before:
             q, v = free_motion(mechanics, q, v, before)
         mass = mechanics.mass_matrix(q)
@@ -143,7 +147,8 @@ class RigidConstraints:
         inner = mechanics.gravity(q, g) if mechanics.has_bias else mechanics.inner_forces(q, v, g)
         force = applied_force - inner
         # Joint damping is implicit, by M + θ Δt D.
-        damping, approach = system.joint_damping, system.scene.contact.approach_velocity
+        damping = system.joint_damping
+        approach = system.scene.contact.approach_velocity
         implicit = _implicit_share(mass, damping, dt)
         damped = mass + implicit * dt * np.diag(damping)
         thrown = v
@@ -170,7 +175,8 @@ class RigidConstraints:
             part[:, lasts].sum(axis=1) / dt
             for part in (found.jacobian.T * step.normal, step.dragging)
         )
-        blow, pushed = np.where(blows, struck.normal, 0.0), np.where(lasts, step.normal, 0.0)
+        blow = np.where(blows, struck.normal, 0.0)
+        pushed = np.where(lasts, step.normal, 0.0)
         contact_rows.write_contacts(
             state, found, blow, pushed, np.where(lasts[:, None], step.tangential, 0.0), dt
         )
@@ -192,7 +198,9 @@ class RigidConstraints:
         found: contact_rows.ContactRows,
         removed: Floats,
     ) -> _Solved:
-        (classes, table), values, shapes = system.frictions, system.restitutions, found.geometry[:2]
+        (classes, table) = system.frictions
+        values = system.restitutions
+        shapes = found.geometry[:2]
         scheme = self.scheme
         e: float | Floats = (
             float(values[0]) if len(values) else float(system.scene.contact.restitution)
@@ -224,14 +232,13 @@ class RigidConstraints:
         mu = table[classes[shapes[0]], classes[shapes[1]]]
         bound = velocity_bounds(found.gap, found.gamma, e, dt, removed, self.scheme)
         tangents, rows = contact_rows.tangent_rows(system, q, found)
-        v_free, relaxed = v + dt * np.linalg.solve(mass, force), self.friction == "relaxed"
+        v_free = v + dt * np.linalg.solve(mass, force)
+        relaxed = self.friction == "relaxed"
         velocity, normal, slip = friction_step(
             mass, v_free, found.jacobian, rows, bound, mu, relaxed
         )
-        along, dragging = (
-            np.einsum("csx,cs->cx", tangents, slip),
-            np.einsum("csd,cs->dc", rows, slip),
-        )
+        along = np.einsum("csx,cs->cx", tangents, slip)
+        dragging = np.einsum("csd,cs->dc", rows, slip)
         return _Solved(velocity, normal, along, dragging)
 
 

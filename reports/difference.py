@@ -19,8 +19,13 @@ from reports.numbers_file import ReportNumbers
 from reports.provenance import PEERS, machine_parts
 from verification.table import Table
 
-EXACT, CLOSE, DIFFERS = "exact", "close", "differs"
-TIMING, PROSE, ONLY_OLD, ONLY_NEW = "timing", "prose", "only old", "only new"
+EXACT = "exact"
+CLOSE = "close"
+DIFFERS = "differs"
+TIMING = "timing"
+PROSE = "prose"
+ONLY_OLD = "only old"
+ONLY_NEW = "only new"
 # Another processor orders and rounds sums differently: by some 1e-16 per step, which grows over
 # thousands of steps.
 TOLERANCE = 1e-9
@@ -123,11 +128,9 @@ def compare_reports(
 
 
 def _cells(table: str, old: Table, new: Table, tolerance: float) -> Iterator[Cell]:
-    timed, prose, timed_rows = (
-        {*old.timed, *new.timed},
-        {*old.prose, *new.prose},
-        old.timed_rows or new.timed_rows,
-    )
+    timed = {*old.timed, *new.timed}
+    prose = {*old.prose, *new.prose}
+    timed_rows = old.timed_rows or new.timed_rows
     names = [_names(one, timed_rows) for one in (old, new)]
     if len(old.rows) == len(new.rows) and not timed_rows:
         names = [[f"{number}: {name}" for number, name in enumerate(names[0], 1)]] * 2
@@ -139,9 +142,11 @@ def _cells(table: str, old: Table, new: Table, tolerance: float) -> Iterator[Cel
         for one, own in zip((old, new), names, strict=True)
     )
     for row in dict.fromkeys((*old_rows, *new_rows)):
-        first, second = old_rows.get(row, {}), new_rows.get(row, {})
+        first = old_rows.get(row, {})
+        second = new_rows.get(row, {})
         for column in dict.fromkeys((*first, *second)):
-            gap, by_time = 0.0, timed_rows
+            gap = 0.0
+            by_time = timed_rows
             if column in first and column in second:
                 state, gap = compare_values(first[column], second[column], tolerance)
                 by_time = column in timed or LEFT_OUT in (first[column], second[column])
@@ -162,7 +167,8 @@ def _names(table: Table, timed_rows: bool) -> list[str]:
 
 def _distinct(names: Sequence[str]) -> list[str]:
     """Return the names, each repeated one with a number after it."""
-    seen, found = Counter[str](), []
+    seen = Counter[str]()
+    found = []
     for name in names:
         seen[name] += 1
         found.append(name if seen[name] == 1 else f"{name} ({seen[name]})")
@@ -182,7 +188,8 @@ def compare_values(old: Any, new: Any, tolerance: float) -> tuple[str, float]:
         isinstance(value, int | float) and not isinstance(value, bool) for value in (old, new)
     ):
         return DIFFERS, math.inf
-    largest, apart = max(abs(old), abs(new)), abs(old - new)
+    largest = max(abs(old), abs(new))
+    apart = abs(old - new)
     gap = (
         math.inf
         if not math.isfinite(largest)
@@ -205,7 +212,8 @@ def sentences(found: Difference, tolerance: float) -> Iterator[str]:
     yield f"{found.count(TIMING)} measured times, and what is made from them, are not judged."
     if prose:
         yield f"{prose} sentences differ; they are not judged: their numbers stand in tables."
-    old, new = found.count(ONLY_OLD), found.count(ONLY_NEW)
+    old = found.count(ONLY_OLD)
+    new = found.count(ONLY_NEW)
     if old or new or found.tables_old or found.tables_new:
         yield (
             f"{old} are only in the old report and {new} only in the new one, besides "
@@ -226,7 +234,8 @@ def lines(found: Difference) -> Iterator[str]:
     """Yield a line for each of the SHOWN largest differences: table, row, column, both values,
     relative difference."""
     for cell in found.of(DIFFERS)[:SHOWN]:
-        old, new = str(cell.old), str(cell.new)
+        old = str(cell.old)
+        new = str(cell.new)
         parted = next((i for i, (a, b) in enumerate(zip(old, new, strict=False)) if a != b), 0)
         start = (
             max(0, parted - 8) if max(len(old), len(new)) > _WIDEST else 0

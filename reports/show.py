@@ -111,7 +111,8 @@ def _width(column: list[list[str]]) -> int:
 
 
 def _printed(columns: list[list[list[str]]]) -> str:
-    widths, lines = [_width(column) - len(_GAP) for column in columns], list[str]()
+    widths = [_width(column) - len(_GAP) for column in columns]
+    lines = list[str]()
     for number, row in enumerate(zip(*columns, strict=True)):
         height = max(map(len, row))
         full = [
@@ -191,7 +192,9 @@ def stage_progress(
 def _logged(begun: str) -> Iterator[Callable[[str, int, int], None]]:
     """Write a line when a stage begins, and every SILENCE seconds, as a single step may take
     minutes, how far it is."""
-    stages, start, over = {begun: (0, 0)}, time.monotonic(), Event()
+    stages = {begun: (0, 0)}
+    start = time.monotonic()
+    over = Event()
 
     def progress(stage: str, done: int, total: int) -> None:
         if stage not in stages:

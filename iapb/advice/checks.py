@@ -90,8 +90,11 @@ class Start:
 
     def __init__(self, scene: Scene) -> None:
         mechanism.require_joints(scene)
-        self.scene, self.dt, self.spatial = scene, 1.0 / scene.rate, isinstance(scene, SpatialScene)
-        self.mechanism, (self.q, self.v) = mechanism.mechanism_of(scene), mechanism.start_of(scene)
+        self.scene = scene
+        self.dt = 1.0 / scene.rate
+        self.spatial = isinstance(scene, SpatialScene)
+        self.mechanism = mechanism.mechanism_of(scene)
+        (self.q, self.v) = mechanism.start_of(scene)
         self.shapes = mechanism.shapes_of(scene)
         self.pairs, self.stops = (
             mechanism.pairs_of(scene, self.shapes),
@@ -101,7 +104,8 @@ class Start:
         self.labels = [body.name for body in scene.bodies for _ in body.shapes] + [
             wall.name for wall in scene.walls
         ]
-        solids, trees = solids_of(self.shapes), self.mechanism.tree_of_body
+        solids = solids_of(self.shapes)
+        trees = self.mechanism.tree_of_body
         size = [solids[i].thin if i in solids else math.inf for i in range(len(self.labels))]
         ranges = mechanism.limits_of(scene)
         for b, sign, arm in zip(
@@ -119,10 +123,8 @@ class Start:
         # contacts: trees (at a wall twice the same), Jacobian rows J (c, d), friction, thickness of
         # the thinner
         self.found = found = self._contacts(size[: len(self.shapes.kind)])
-        self.tree_a, self.tree_b = (
-            trees[found.body_a],
-            trees[np.where(found.body_b < 0, found.body_a, found.body_b)],
-        )
+        self.tree_a = trees[found.body_a]
+        self.tree_b = trees[np.where(found.body_b < 0, found.body_a, found.body_b)]
         self.rows = self.rows_along(np.arange(len(found.gap)), found.normal)
         self.first_stop = len(self.rows) - len(none)
         self.rows[np.arange(self.first_stop, len(self.rows)), self.stops.dof] = (
@@ -139,7 +141,8 @@ class Start:
         margin = math.inf
         if len(self.pairs) > MANY_PAIRS:
             margin = max((size for size in sizes if size < math.inf), default=0.0)
-        placed, stops = self.mechanism.placements(self.q), self.stops
+        placed = self.mechanism.placements(self.q)
+        stops = self.stops
         found = ContactFinder(self.shapes, self.pairs).find(*placed, margin)
         limits = Contacts(
             stops.shape,
@@ -156,7 +159,8 @@ class Start:
 
     def rows_along(self, contacts: Rows, directions: Floats) -> Floats:
         """Return the Jacobian rows (k, d) of contacts (k,) along directions (k, 3)."""
-        qs, point = np.tile(self.q, (len(contacts), 1)), self.found.point[contacts]
+        qs = np.tile(self.q, (len(contacts), 1))
+        point = self.found.point[contacts]
         a, b = (
             self.mechanism.rows_along(qs, body[contacts], point, directions)
             for body in (self.found.body_a, self.found.body_b)
@@ -195,7 +199,8 @@ class Start:
 
     def handed(self, q: Floats, time: float) -> Floats:
         """Generalized force (d,) of the hand at q and at a time [s]."""
-        force, wrench = np.zeros(self.mechanism.nv), mechanism.wrench_of(self.scene, time)
+        force = np.zeros(self.mechanism.nv)
+        wrench = mechanism.wrench_of(self.scene, time)
         if wrench.any():
             body = self.mechanism.index(self.hand.body)
             R, p = self.mechanism.placements(q)
@@ -230,9 +235,11 @@ class Start:
     def meeting(self) -> tuple[Floats, Floats]:
         """When each gap closes at constant acceleration [s], infinite if never, and with which
         speed [m/s]."""
-        gap, approach = np.maximum(self.found.gap, 0.0), -(self.rows @ self.v)
+        gap = np.maximum(self.found.gap, 0.0)
+        approach = -(self.rows @ self.v)
         square = approach**2 - 2.0 * self.pull * gap
-        speed, time = np.sqrt(np.maximum(square, 0.0)), np.where(gap == 0.0, 0.0, math.inf)
+        speed = np.sqrt(np.maximum(square, 0.0))
+        time = np.where(gap == 0.0, 0.0, math.inf)
         np.divide(2.0 * gap, approach + speed, out=time, where=approach + speed > 0.0)
         return np.where(square < 0.0, math.inf, time), speed
 
@@ -275,7 +282,8 @@ class Start:
         }
         falls: dict[int, Rows] = {}
         for rows in self.by_pair:
-            i, tree = int(rows[0]), int(self.tree_a[rows[0]])
+            i = int(rows[0])
+            tree = int(self.tree_a[rows[0]])
             free = (
                 np.count_nonzero(self.mechanism.tree_of_body == tree) == 1
             )  # a linkage would change its pose
@@ -305,7 +313,8 @@ class Start:
     def loads(self, rows: Rows) -> Floats:
         """Return forces p >= 0 (c,) [N] of a group of contacts that balance gravity and the hand: W
         p = −J M⁻¹ f."""
-        W, force = self.rows[rows] @ self.moved(self.rows[rows]), np.zeros(len(rows))
+        W = self.rows[rows] @ self.moved(self.rows[rows])
+        force = np.zeros(len(rows))
         pushing = np.ones(len(rows), np.bool_)
         for _ in range(len(rows)):
             force[:] = 0.0
@@ -345,7 +354,8 @@ def step_limits(start: Start) -> StepLimits | None:
 
 def _limits_at(start: Start, mobility: float, rows: Rows, most: float) -> StepLimits:
     """Return the limits at contacts (c,) of a mobility [1/kg]: k + 2 b <= 4, and k <= `most`."""
-    dt, (K, B) = start.dt, start.scene.contact.gains
+    dt = start.dt
+    (K, B) = start.scene.contact.gains
     stable = 4.0 * (1.0 + ROUNDED)
     k = K * mobility * dt**2
     b = B * mobility * dt
@@ -382,7 +392,8 @@ def check_scene(
     """
     chosen: Any = laws.ImpulseAugmented() if law is None else law
     chosen = chosen.within(scene) if hasattr(chosen, "within") else chosen
-    start, uses = Start(scene), frozenset[str](getattr(chosen, "uses", ()))
+    start = Start(scene)
+    uses = frozenset[str](getattr(chosen, "uses", ()))
     found = [*_degrees(scene), *_inertias(scene), *_overlaps(start), *_fast(start)]
     if laws.PENALTY in uses and not scene.contact.rigid:
         found += _sags(start)
@@ -461,32 +472,32 @@ def _inertias(scene: Scene) -> Iterator[Caution]:
 def _overlaps(start: Start) -> Iterator[Caution]:
     """Warn of shapes that start inside each other, behind a wall, or in a gap narrower than the
     shape."""
-    found, sides, resting = start.found, dict[int, list[int]](), np.zeros(len(start.rows))
+    found = start.found
+    sides = dict[int, list[int]]()
+    resting = np.zeros(len(start.rows))
     for rows in start.touching:
         resting[rows] = start.loads(rows)
     for rows in start.by_pair:
         i = int(rows[0])
-        depth, (a, b) = (
-            -float(found.gap[i]),
-            (start.labels[s] for s in (found.shape_a[i], found.shape_b[i])),
-        )
+        depth = -float(found.gap[i])
+        (a, b) = (start.labels[s] for s in (found.shape_a[i], found.shape_b[i]))
         if depth <= 0.0 or not _too_deep(start, rows, float(resting[rows].max())):
             continue
         if found.body_b[i] < 0:
             sides.setdefault(int(found.body_a[i]), []).append(i)
-        kind, says = "overlap", f"{a} starts {in_metres(depth)} inside {b}, and "
+        kind = "overlap"
+        says = f"{a} starts {in_metres(depth)} inside {b}, and "
         out = ", ".join(f"{depth * x:.3g}" for x in found.normal[i][: 3 if start.spatial else 2])
         remedy = f": move it by [{out}] m"
         if start.kind[found.shape_b[i]] in geometry.ENDLESS and depth >= start.thickness[i]:
-            kind, says = "outside", f"{a} starts behind {b}, {in_metres(depth)} deep"
+            kind = "outside"
+            says = f"{a} starts behind {b}, {in_metres(depth)} deep"
         elif (
             float(start.rows[i] @ start.moved(start.rows[i][None])[:, 0])
             <= 1e-12 * start.critical[0][0]
         ):
-            says, remedy = (
-                f"{says}no joint can move it out",
-                f"{remedy}, or take the shape or the wall away",
-            )
+            says = f"{says}no joint can move it out"
+            remedy = f"{remedy}, or take the shape or the wall away"
         else:
             K, _ = start.scene.contact.gains
             stored = 0.5 * K * float(np.sum(np.minimum(found.gap[rows], 0.0) ** 2))
@@ -514,19 +525,16 @@ def _overlaps(start: Start) -> Iterator[Caution]:
 def _too_deep(start: Start, rows: Rows, resting: float) -> bool:
     """Whether a pair starts deeper than at rest, under a load [N], judged by its depth and its
     springs' energy."""
-    gap, J = np.minimum(start.found.gap[rows], 0.0), start.rows[rows]
-    depth, size, K = (
-        -float(gap.min()),
-        float(start.thickness[rows[0]]),
-        start.scene.contact.gains[0],
-    )
+    gap = np.minimum(start.found.gap[rows], 0.0)
+    J = start.rows[rows]
+    depth = -float(gap.min())
+    size = float(start.thickness[rows[0]])
+    K = start.scene.contact.gains[0]
     if depth * K <= 2.0 * resting and K > 0.0:
         return False
     mass = 1.0 / max(float(np.max(np.sum(J * start.moved(J).T, axis=1))), 1e-300)
-    kinetic, weight = (
-        0.5 * mass * np.abs(J @ start.v).max() ** 2,
-        mass * np.abs(start.pull[rows]).max(),
-    )
+    kinetic = 0.5 * mass * np.abs(J @ start.v).max() ** 2
+    weight = mass * np.abs(start.pull[rows]).max()
     usual = max(
         kinetic + weight * DEEP * size, 0.5 * mass * size**2
     )  # the latter: moving by its size in a second
@@ -536,7 +544,8 @@ def _too_deep(start: Start, rows: Rows, resting: float) -> bool:
 def _fast(start: Start) -> Iterator[Caution]:
     """Warn of bodies that move by more than half of a shape in the step of the impact."""
     for i in (int(rows[0]) for rows in start.by_pair):
-        (time, speed), size = (float(x[i]) for x in start.meeting), float(start.thickness[i])
+        (time, speed) = (float(x[i]) for x in start.meeting)
+        size = float(start.thickness[i])
         leaving = start.rows[i] @ start.v >= 0.0 and start.pull[i] >= 0.0
         if leaving or time > start.scene.duration or speed * start.dt <= 0.5 * size:
             continue
@@ -560,15 +569,12 @@ def _slips_through_impacts(start: Start) -> Iterator[Caution]:
     # Friction in the impact would reduce the slip by up to Δv = μ (1 + e) v_n. Without it, resting
     # friction removes the same slip within Δv/(μ a), a the acceleration onto the wall; a bounce
     # keeps it for a flight of 2 e v_n/a.
-    scene, found, first = (
-        start.scene,
-        start.found,
-        dict[int, tuple[float, int]](),
-    )  # tree -> time, contact
-    trees, held = (
-        start.mechanism.tree_of_body.tolist(),
-        scene.hand.body if scene.hand is not None else "",
-    )
+    # tree -> time, contact
+    scene = start.scene
+    found = start.found
+    first = dict[int, tuple[float, int]]()
+    trees = start.mechanism.tree_of_body.tolist()
+    held = scene.hand.body if scene.hand is not None else ""
     free = {
         tree
         for tree, body in zip(trees, scene.bodies, strict=True)
@@ -578,29 +584,30 @@ def _slips_through_impacts(start: Start) -> Iterator[Caution]:
         both = {int(start.tree_a[i]), int(start.tree_b[i])}
         for tree in both if both <= free else ():
             first[tree] = min(first.get(tree, (math.inf, i)), (float(start.meeting[0][i]), i))
-    worst, said = SHIFTED, list[Caution]()
+    worst = SHIFTED
+    said = list[Caution]()
     for time, i in sorted(first.values()):
         if time >= scene.duration or start.friction[i] == 0.0:
             continue
-        speed, mu, left = (
-            float(start.meeting[1][i]),
-            float(start.friction[i]),
-            scene.duration - time,
-        )
+        speed = float(start.meeting[1][i])
+        mu = float(start.friction[i])
+        left = scene.duration - time
         e = float(
             mechanism.restitution_by_pair(scene, np.array([[found.shape_a[i], found.shape_b[i]]]))[
                 0
             ]
         )
         slip = float(np.linalg.norm(start.slips(i) @ (start.v + time * start.fall)))
-        change, force = min(mu * (1.0 + e) * speed, slip), -float(start.pull[i])
+        change = min(mu * (1.0 + e) * speed, slip)
+        force = -float(start.pull[i])
         lasts = (
             left
             if force <= 0.0
             else min(left, max(2.0 * e * speed / force, 0.5 * change / (mu * force)))
         )
         if change * lasts / float(start.thickness[i]) >= worst:
-            worst, names = change * lasts / float(start.thickness[i]), start.names([i])
+            worst = change * lasts / float(start.thickness[i])
+            names = start.names([i])
             said = [
                 Caution(
                     "impact friction",
@@ -616,7 +623,8 @@ def _slips_through_impacts(start: Start) -> Iterator[Caution]:
 
 def _too_stiff(start: Start) -> Iterator[Caution]:
     """Warn of stiffness or damping beyond the stable limits of the step."""
-    limits, contact = step_limits(start), start.scene.contact
+    limits = step_limits(start)
+    contact = start.scene.contact
     K, B = contact.gains
     if limits is None or (K <= limits.stiffness and B <= limits.damping):
         return
@@ -636,7 +644,9 @@ def _too_stiff(start: Start) -> Iterator[Caution]:
 def _sags(start: Start) -> Iterator[Caution]:
     """Warn of static loads that sag by more than a tenth: of a shape at a contact, of the range at
     a joint limit."""
-    (K, _), stops, found = start.scene.contact.gains, start.stops, [(0.0, -1)]
+    (K, _) = start.scene.contact.gains
+    stops = start.stops
+    found = [(0.0, -1)]
     for rows in start.supports if K > 0.0 else ():
         shares = start.loads(rows) / (K * start.thickness[rows])
         found.append((float(shares.max()), int(rows[shares.argmax()])))
@@ -660,7 +670,9 @@ def _sags(start: Start) -> Iterator[Caution]:
 
 def _overdriven_friction(start: Start) -> Iterator[Caution]:
     """Warn where friction (6), an explicit damper μN/v_thr, reverses a motion within a step."""
-    contact, worst, where = start.scene.contact, 2.0, ""
+    contact = start.scene.contact
+    worst = 2.0
+    where = ""
     for rows in start.supports:
         root = np.sqrt(
             start.friction[rows] * start.loads(rows) * start.dt / contact.friction_velocity
@@ -670,7 +682,8 @@ def _overdriven_friction(start: Start) -> Iterator[Caution]:
         ]
         found = start.mobility(np.array(tangents))
         if found > worst * (1.0 + ROUNDED):
-            worst, where = found, start.names(rows)
+            worst = found
+            where = start.names(rows)
     if where:
         yield Caution(
             "friction",
@@ -692,7 +705,8 @@ def _coupled(start: Start, coupling: str) -> Iterator[Caution]:
     if wrong:
         yield _growing(start, coupling, loops, wrong[0])
         return
-    device, loop = start.scene.device, next(iter(loops.values()))
+    device = start.scene.device
+    loop = next(iter(loops.values()))
     times = start.hand.times(start.scene.duration)
     inverse = np.linalg.inv(loop.mass)
     hand = max(
@@ -715,8 +729,11 @@ def _coupled(start: Start, coupling: str) -> Iterator[Caution]:
 
 def _growing(start: Start, coupling: str, loops: dict[str, HapticLoop], where: str) -> Caution:
     """Return the warning of a loop that grows: where, by which limit, and what to set."""
-    every, loop, rate = [*loops.values()], loops[where], start.scene.rate
-    names, one = start.mechanism.velocity_names[start.tool], np.eye(len(loop.mass))
+    every = [*loops.values()]
+    loop = loops[where]
+    rate = start.scene.rate
+    names = start.mechanism.velocity_names[start.tool]
+    one = np.eye(len(loop.mass))
 
     def holds(factors: dict[str, Any]) -> bool:
         return hold(scaled(each, factors) for each in every)
@@ -771,7 +788,9 @@ def _loops(start: Start, coupling: str) -> dict[str, HapticLoop]:
 
     What the tool touches counts as fixed.
     """
-    scene, tool, contact = start.scene, start.tool, start.scene.contact
+    scene = start.scene
+    tool = start.tool
+    contact = start.scene.contact
     gains: Gains = getattr(scene.couplings, coupling.replace("-", "_"))
     device: Any = scene.device
     mass = start.mechanism.mass_matrix(start.q)[tool, tool]

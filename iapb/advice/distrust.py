@@ -79,10 +79,8 @@ class _Seen:
     """A run with its scene, made again from the record, its mechanism and its shapes."""
 
     def __init__(self, run: Run) -> None:
-        self.run, self.scene = (
-            run,
-            scene_kind(run.scene_resolved).model_validate(run.scene_resolved),
-        )
+        self.run = run
+        self.scene = scene_kind(run.scene_resolved).model_validate(run.scene_resolved)
         self.bodies, self.mechanism, shapes = (
             self.scene.bodies,
             mechanism_of(self.scene),
@@ -159,22 +157,20 @@ def _energy(seen: _Seen) -> Iterator[str]:
 def _books(seen: _Seen) -> Iterator[_Book]:
     """Yield the books of the scene, of groups of trees that touch, and of single trees, where there
     is a balance."""
-    run, mechanism, begin = seen.run, seen.mechanism, seen.begin
-    trees, ranges, ledgers = (
-        mechanism.tree_of_body,
-        mechanism.tree_dofs,
-        dict[int, dict[str, Floats]](),
-    )
+    run = seen.run
+    mechanism = seen.mechanism
+    begin = seen.begin
+    trees = mechanism.tree_of_body
+    ranges = mechanism.tree_dofs
+    ledgers = dict[int, dict[str, Floats]]()
     roots = np.searchsorted(trees, np.arange(len(ranges)))
     if {"kinetic", "potential", "hand_work", "coupling_work"} <= set(run.energy):
         yield _balance(seen, run.energy, 0, trees >= 0, "")
     moving = [t for t, (start, stop) in enumerate(ranges) if start < stop and run.steps > begin]
     for t in (t for t in moving if ranges[t] != seen.carried):
-        alone, dofs, q = (
-            mechanism.alone(t),
-            slice(*ranges[t]),
-            int(mechanism.arrays.q_start[trees == t].min()),
-        )
+        alone = mechanism.alone(t)
+        dofs = slice(*ranges[t])
+        q = int(mechanism.arrays.q_start[trees == t].min())
         forces = {name: getattr(run, f"{name}_force")[begin:, dofs] for name in FORCES}
         states = run.q[begin:, q : q + alone.nq], run.v[begin:, dofs]
         impulse = np.ascontiguousarray(run.impulse[begin:, dofs])
@@ -212,7 +208,8 @@ def _books(seen: _Seen) -> Iterator[_Book]:
 def _of_whole_steps(seen: _Seen, residual: Floats, dofs: slice) -> Floats:
     """Return the residual of one tree without the steps that were cut at its touches: their forces
     are means, so that the work of a single tree is not known."""
-    run, begin = seen.run, seen.begin
+    run = seen.run
+    begin = seen.begin
     forces = [run.impulse, run.penalty_force, run.friction_force]
     touched = np.any([force[begin:, dofs].any(axis=1) for force in forces], axis=0)
     cut = ~np.isnan(lost_within(run))[begin:] & touched
@@ -227,7 +224,8 @@ def _balance(
     rows = slice(*contacts.offsets[begin : begin + 2].tolist())
     gap = contacts.gap[rows][bodies[contacts.body_a[rows]]]
     springs = _in_overlaps(seen, np.minimum(gap, 0.0), bodies)
-    total, at_hand = energy["kinetic"] + energy["potential"], _at_hand(energy) + springs
+    total = energy["kinetic"] + energy["potential"]
+    at_hand = _at_hand(energy) + springs
     excess = total[1:] - (total[0] + springs + energy["hand_work"] + energy["coupling_work"])
     friction = energy.get("friction_work", np.zeros(0))
     most = UNACCOUNTED * at_hand + seen.trifle(bodies)
@@ -242,7 +240,9 @@ def _booked_late(seen: _Seen, begin: int, bodies: Booleans) -> Floats:
     The ledger takes the way of the velocity after the force, kinetic energy that of the mean
     velocity. Friction that only turns the velocity, on a turntable, does no work.
     """
-    run, mechanism, late = seen.run, seen.mechanism, np.zeros(seen.run.steps - begin)
+    run = seen.run
+    mechanism = seen.mechanism
+    late = np.zeros(seen.run.steps - begin)
     for t in np.unique(mechanism.tree_of_body[bodies]).tolist():
         dofs = slice(*mechanism.tree_dofs[t])
         force = run.friction_force[begin:, dofs]
@@ -264,7 +264,8 @@ def _in_overlaps(seen: _Seen, gap: Floats, bodies: Booleans) -> float:
         return 0.5 * seen.scene.contact.stiffness * float(np.sum(gap**2))
     depth = -float(gap.min(initial=0.0))
     mass = sum(body.mass for body, chosen in zip(seen.bodies, bodies, strict=True) if chosen)
-    speed, gravity = depth / (FADING * seen.run.dt), float(np.linalg.norm(seen.gravity))
+    speed = depth / (FADING * seen.run.dt)
+    gravity = float(np.linalg.norm(seen.gravity))
     return mass * (0.5 * speed**2 + gravity * depth)
 
 
@@ -284,13 +285,16 @@ def _driven(seen: _Seen) -> Iterator[str]:
     The energy of the coupling's springs counts while it acts. A unilateral coupler moves the tool
     where it does not act.
     """
-    run, begin, tool = seen.run, seen.begin, slice(*seen.run.tool_dofs)
+    run = seen.run
+    begin = seen.begin
+    tool = slice(*seen.run.tool_dofs)
     stiffness = np.array(run.coupling_settings.get("stiffness", ()))
     known = "device_kinetic" in run.energy and len(stiffness) == run.device_v.shape[1]
     if not known or run.steps <= begin:
         return
     tree = seen.mechanism.alone(seen.mechanism.tree_dofs.index(run.tool_dofs))
-    q, v = run.q[begin:, slice(*run.tool_coordinates)], run.v[begin:, tool]
+    q = run.q[begin:, slice(*run.tool_coordinates)]
+    v = run.v[begin:, tool]
     apart = tree.displacements(np.stack([q, run.device_q[begin:]], axis=1).reshape(-1, q.shape[1]))
     springs = np.diff(0.5 * apart[::2] ** 2 @ stiffness)
     force = run.coupling_force[begin:, tool]
@@ -328,7 +332,10 @@ def _rise(work: Floats) -> Floats:
 def _spun(seen: _Seen) -> Iterator[str]:
     """Say which free body that carries nothing changes its spin or speed, gravity apart, while no
     force acts on it."""
-    run, begin, start, parents = seen.run, seen.begin, 0, {body.parent for body in seen.bodies}
+    run = seen.run
+    begin = seen.begin
+    start = 0
+    parents = {body.parent for body in seen.bodies}
     forces = [run.impulse, *(getattr(run, f"{name}_force") for name in FORCES)]
     for b, body in enumerate(seen.bodies):
         count = 0 if body.joint_mimic else KINDS[body.joint].nv
@@ -348,7 +355,8 @@ def _spun(seen: _Seen) -> Iterator[str]:
         alone = ~np.any([force[begin:, dofs].any(axis=1) for force in forces], axis=0)[
             :, None, None
         ]
-        v, flat = run.v[begin:, dofs], body.joint == "planar"
+        v = run.v[begin:, dofs]
+        flat = body.joint == "planar"
         turn = _frames(run, b, np.arange(begin, run.steps + 1))[0]
         turning, origin = (
             (v * [0.0, 0.0, 1.0], v * [1.0, 1.0, 0.0]) if flat else (v[:, 3:], v[:, :3])
@@ -360,7 +368,8 @@ def _spun(seen: _Seen) -> Iterator[str]:
             turn @ arm[..., None]
             + (rotation_of((0.0, 0.0, body.angle)) if flat else turn) @ origin[..., None]
         )
-        falls, fastest = seen.gravity[:, None] * run.dt, np.linalg.norm(origin, axis=1).max()
+        falls = seen.gravity[:, None] * run.dt
+        fastest = np.linalg.norm(origin, axis=1).max()
         for what, moved, due, most in (("spin", spin, 0.0, 0.0), ("speed", speed, falls, fastest)):
             drift = np.linalg.norm(
                 np.cumsum(alone * (np.diff(moved, axis=0) - due), axis=0), axis=1
@@ -377,7 +386,8 @@ def _spun(seen: _Seen) -> Iterator[str]:
 def _sank(seen: _Seen) -> Iterator[str]:
     """Say where two bodies overlap by more than half of the thinner one, or a body by all of a
     wall's thickness."""
-    run, table = seen.run, seen.run.contacts
+    run = seen.run
+    table = seen.run.contacts
     thinner = np.minimum(seen.sizes[table.body_a], seen.sizes[table.body_b])
     most = DEEP * thinner
     for wall in (solid for solid in seen.solids.values() if solid.body < 0):
@@ -386,10 +396,8 @@ def _sank(seen: _Seen) -> Iterator[str]:
             table.point[rows] - 0.5 * table.gap[rows, None] * table.normal[rows]
         )  # on the surface of their wall
         rows = rows[np.abs(wall.height(ends)) < -NEAR * table.gap[rows]]
-        thinner[rows], most[rows] = (
-            np.minimum(thinner[rows], wall.thin),
-            np.minimum(most[rows], wall.thin),
-        )
+        thinner[rows] = np.minimum(thinner[rows], wall.thin)
+        most[rows] = np.minimum(most[rows], wall.thin)
     share = -table.gap / most
     share[_landed(seen, np.flatnonzero((share > 1.0) & (-table.gap < thinner)))] = 0.0
     i = int(np.argmax(share)) if len(share) else -1
@@ -416,7 +424,8 @@ def _landed(seen: _Seen, rows: Integers) -> Integers:
     """
     if seen.scene.contact.forces != "implicit":
         return rows[:0]
-    table, landed = seen.run.contacts, list[int]()
+    table = seen.run.contacts
+    landed = list[int]()
     step = np.searchsorted(table.offsets, np.arange(len(table.gap)), "right")
     pair = np.stack([step, table.body_a, table.body_b], axis=1)
     new = table.is_new & (table.gap >= LANDING * table.normal_velocity * seen.run.dt)
@@ -436,7 +445,9 @@ def _landed(seen: _Seen, rows: Integers) -> Integers:
 def _passed(seen: _Seen) -> Iterator[str]:
     """Say which body is the first to pass through a wall or another body within one step (see
     `_crosses`)."""
-    run, first, said = seen.run, seen.run.steps, ""
+    run = seen.run
+    first = seen.run.steps
+    said = ""
     moved = np.zeros(
         (run.steps, len(seen.sizes))
     )  # how far any point of each body moves [m]; last, the world
@@ -445,9 +456,11 @@ def _passed(seen: _Seen) -> Iterator[str]:
         reach = max((solid.reach for solid in seen.solids.values() if solid.body == b), default=0.0)
         turned = np.linalg.norm(np.diff(turn, axis=0), axis=(1, 2)) / math.sqrt(2.0)
         moved[:, b] = np.linalg.norm(np.diff(origin, axis=0), axis=1) + reach * turned
-    top, places = moved.max(axis=0), _places(run)[:-1]
+    top = moved.max(axis=0)
+    places = _places(run)[:-1]
     for a, b in seen.pairs.tolist():
-        one, other = seen.solids[a], seen.solids[b]
+        one = seen.solids[a]
+        other = seen.solids[b]
         far = FAST * min(one.thin, other.thin)
         if top[one.body] + top[other.body] <= far:
             continue
@@ -459,7 +472,8 @@ def _passed(seen: _Seen) -> Iterator[str]:
         k = np.flatnonzero((way > far) & (way >= apart))
         through = k[_crosses(run, one, other, k) | _crosses(run, other, one, k)] if len(k) else k
         if len(through):
-            first, said = int(through[0]), f"{seen.names[a]} passes through {seen.names[b]}"
+            first = int(through[0])
+            said = f"{seen.names[a]} passes through {seen.names[b]}"
     if said:
         yield f"{said} in the step to {run.time[first + 1]:.4g} s"
 
@@ -488,13 +502,18 @@ def _places(run: Run) -> Floats:
 def _frames(run: Run, body: int, at: Integers) -> tuple[Floats, Floats]:
     """Return axes (n, 3, 3), as columns, and origin (n, 3) of a body, or of the world (-1), at some
     instants."""
-    turn, origin = np.tile(np.eye(3), (len(at), 1, 1)), np.zeros((len(at), 3))
+    turn = np.tile(np.eye(3), (len(at), 1, 1))
+    origin = np.zeros((len(at), 3))
     pose = run.pose[at, body]
     if body >= 0 and run.pose.shape[2] == 3:
-        origin[:, :2], c, s = pose[:, :2], np.cos(pose[:, 2]), np.sin(pose[:, 2])
+        origin[:, :2] = pose[:, :2]
+        c = np.cos(pose[:, 2])
+        s = np.sin(pose[:, 2])
         turn[:, :2, :2] = np.stack([c, -s, s, c], axis=1).reshape(-1, 2, 2)
     elif body >= 0:
-        origin, (x, y, z, w), o = pose[:, :3], pose[:, 3:].T, np.zeros(len(at))
+        origin = pose[:, :3]
+        (x, y, z, w) = pose[:, 3:].T
+        o = np.zeros(len(at))
         cross = np.stack([o, -z, y, z, o, -x, -y, x, o], axis=1).reshape(-1, 3, 3)
         turn = turn + 2.0 * (w[:, None, None] * cross + cross @ cross)
     return turn, origin
@@ -503,22 +522,22 @@ def _frames(run: Run, body: int, at: Integers) -> tuple[Floats, Floats]:
 def _squeezed(seen: _Seen) -> Iterator[str]:
     """Say which body moves on by more than its size in a gap that is a tenth of its size too
     narrow."""
-    run, table = seen.run, seen.run.contacts
+    run = seen.run
+    table = seen.run.contacts
     for b, size in enumerate(seen.sizes[:-1].tolist()):
         rows = np.flatnonzero((table.body_a == b) & (table.body_b < 0) & (table.gap < 0.0))
         if not (
             table.gap[rows] < -0.5 * NARROW * size
         ).any():  # of two opposed contacts one has half of the overlap
             continue
-        step, caught, widest = (
-            np.searchsorted(table.offsets, rows, "right") - 1,
-            [np.zeros(0, np.int64)],
-            0.0,
-        )
+        step = np.searchsorted(table.offsets, rows, "right") - 1
+        caught = [np.zeros(0, np.int64)]
+        widest = 0.0
         for apart in range(
             1, int(np.bincount(step - step[0]).max())
         ):  # the contacts of a step are consecutive
-            one, other = rows[:-apart], rows[apart:]
+            one = rows[:-apart]
+            other = rows[apart:]
             narrow = -(table.gap[one] + table.gap[other])
             facing = np.einsum("ij,ij->i", table.normal[one], table.normal[other]) < -0.9
             held = (step[:-apart] == step[apart:]) & facing & (narrow > NARROW * size)
@@ -537,9 +556,11 @@ def _squeezed(seen: _Seen) -> Iterator[str]:
 
 def _flew(seen: _Seen) -> Iterator[str]:
     """Say which position is farther than start, speed and acceleration can explain."""
-    run, lengths = seen.run, [i for i, unit in enumerate(seen.run.coordinate_units) if unit == "m"]
+    run = seen.run
+    lengths = [i for i, unit in enumerate(seen.run.coordinate_units) if unit == "m"]
     moved = np.abs(run.q - run.q[0]).max(axis=0)[lengths]
-    time, masses = float(run.time[-1]), [body.mass for body in seen.bodies if body.mass]
+    time = float(run.time[-1])
+    masses = [body.mass for body in seen.bodies if body.mass]
     push = float(np.linalg.norm(run.hand_force, axis=1).max(initial=0.0)) / min(masses, default=1.0)
     reach = float(np.abs(run.q[0]).max() + seen.sizes[np.isfinite(seen.sizes)].max(initial=0.0))
     reach += float(
@@ -553,7 +574,8 @@ def _flew(seen: _Seen) -> Iterator[str]:
 def _overran(seen: _Seen) -> Iterator[str]:
     """Say which joint goes beyond a limit by more than half of its range, or by more than OVERRUN
     at the end."""
-    run, most = seen.run, OVERRUN[seen.scene.contact.forces]
+    run = seen.run
+    most = OVERRUN[seen.scene.contact.forces]
     limited = zip(seen.mechanism.arrays.q_start, limits_of(seen.scene), strict=True)
     for i, (low, high) in ((i, limits) for i, limits in limited if limits):
         beyond = np.maximum(low - run.q[:, i], run.q[:, i] - high) / (high - low)

@@ -80,11 +80,9 @@ class Question:
     def sinking(self) -> list[str]:
         """Names of bodies whose generalized gravity force is not exactly zero at all of some random
         poses."""
-        mechanism, field, chance = (
-            self.mechanism,
-            self.scene.gravity or (),
-            np.random.default_rng(0),
-        )
+        mechanism = self.mechanism
+        field = self.scene.gravity or ()
+        chance = np.random.default_rng(0)
         q = np.array([x for body in self.scene.bodies for x in body.position], np.float64)
         felt = np.zeros(mechanism.nv, np.bool_)
         for _ in range(_POSES if any(field) else 0):
@@ -538,12 +536,11 @@ def decide_for(
 ) -> tuple[Effect, ...]:
     """Do what `decide_effects` does for a scene with its shapes and candidate pairs (k, 2)."""
     body_a, body_b = shapes.body[pairs.T]
-    wall, same = body_b < 0, mechanism.tree_of_body[body_a] == mechanism.tree_of_body[body_b]
+    wall = body_b < 0
+    same = mechanism.tree_of_body[body_a] == mechanism.tree_of_body[body_b]
     to_walls, between, within = (int(each.sum()) for each in (wall, ~wall & ~same, ~wall & same))
-    restitutions, frictions = (
-        restitutions_of(scene, pairs),
-        sorted(set(frictions_of(scene).by_pair(pairs).tolist())),
-    )
+    restitutions = restitutions_of(scene, pairs)
+    frictions = sorted(set(frictions_of(scene).by_pair(pairs).tolist()))
     if law is not None and not isinstance(law, str):
         law = law.within(scene) if hasattr(law, "within") else law
         rendering = getattr(law, "rendering", "full") if rendering is None else rendering

@@ -105,7 +105,8 @@ class HapticLoop:
         """Return the matrix (n, 2 d, 2 d) of the equations on the circle, just outside the unit
         circle."""
         exponent = (max(self.dt / self.within, CLOSE) + 1j * angle)[:, None, None]
-        z, w = np.exp(exponent), np.expm1(exponent)
+        z = np.exp(exponent)
+        w = np.expm1(exponent)
         rate = w / self.dt  # times z: a velocity after the step, without: before it
         inertia = self.mass * rate**2
         coupling = z * np.diag(self.stiffness) + rate * np.diag(self.damping)

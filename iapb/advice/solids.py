@@ -29,7 +29,9 @@ class Solid(NamedTuple):
     @classmethod
     def of(cls, shapes: Shapes, i: int) -> Solid:
         """Return shape number i of a scene, which must not be endless."""
-        body, radius, none = int(shapes.body[i]), float(shapes.radius[i]), np.zeros(0)
+        body = int(shapes.body[i])
+        radius = float(shapes.radius[i])
+        none = np.zeros(0)
         corners = np.pad(
             shapes.vertices[shapes.first[i] : shapes.first[i] + shapes.count[i]], ((0, 0), (0, 1))
         )
@@ -46,7 +48,8 @@ class Solid(NamedTuple):
             corners = centre + (signs * shapes.half_size[i]) @ shapes.axes[i].T
             normals = np.vstack([shapes.axes[i].T, -shapes.axes[i].T])
         points = np.vstack([centre, corners])
-        over, far = points @ normals.T, float(np.linalg.norm(points - middle, axis=1).max())
+        over = points @ normals.T
+        far = float(np.linalg.norm(points - middle, axis=1).max())
         return cls(
             body, points, normals, over.max(axis=0), 0.0, float(np.ptp(over, axis=0).min()), far
         )
@@ -72,7 +75,9 @@ class Solid(NamedTuple):
             core = (
                 max(self.radius, radius) + GRAZED * self.thin if radius > 0.0 else self.radius
             ) - arc
-            start, end, way = before - self.points[0], after - self.points[0], after - before
+            start = before - self.points[0]
+            end = after - self.points[0]
+            way = after - before
             share = np.clip(
                 -(start * way).sum(axis=-1) / np.maximum((way * way).sum(axis=-1), 1e-300), 0.0, 1.0
             )

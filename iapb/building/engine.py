@@ -90,18 +90,22 @@ def bitcode_of(number: int) -> Any:
 
 def object_of(number: int) -> bytes:
     """Return the object code of an entry with all kernels that it needs."""
-    compiled, target = bitcode_of(number), machine()
+    compiled = bitcode_of(number)
+    target = machine()
     module = llvm.parse_assembly("")
-    module.triple, module.data_layout = target.triple, str(target.target_data)
+    module.triple = target.triple
+    module.data_layout = str(target.target_data)
     for each in compiled.library.needed:
         module.link_in(each._final_module, preserve=True)
     for value in (*module.functions, *module.global_variables):
         if not value.is_declaration:
             value.linkage = "internal"
     entry = module.get_function(compiled.fndesc.llvm_func_name)
-    entry.name, entry.linkage = symbol_of(number), "external"
+    entry.name = symbol_of(number)
+    entry.linkage = "external"
     tuning = llvm.create_pipeline_tuning_options(speed_level=3)
-    tuning.loop_vectorization, tuning.inlining_threshold = True, INLINE_UP_TO
+    tuning.loop_vectorization = True
+    tuning.inlining_threshold = INLINE_UP_TO
     builder = llvm.create_pass_builder(target, tuning)
     builder.getModulePassManager().run(module, builder)
     return bytes(target.emit_object(module))
@@ -123,7 +127,8 @@ const char iapb_manifest[] = %s;
 
 def build(path: Path) -> None:
     """Compile all entries and link them into the library."""
-    kernels, parts = {}, []
+    kernels = {}
+    parts = []
     for number, (kernel, examples) in enumerate(entries()):
         results = kinds_of_result(bitcode_of(number).signature.return_type)
         kernels[f"{kernel.name}({kinds_of(examples)})"] = symbol_of(number), results

@@ -95,7 +95,9 @@ def _impacts() -> None:
 
 def _mechanics(body: Mechanism) -> None:
     """Ask for every quantity of a mechanism."""
-    q, v, g = body.neutral(), np.ones(body.nv), np.ones(3)
+    q = body.neutral()
+    v = np.ones(body.nv)
+    g = np.ones(3)
     body.difference(q, body.integrate(q, v))
     body.poses(q[None], planar=True)
     body.mass_matrix(q)

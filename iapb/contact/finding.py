@@ -35,7 +35,8 @@ class ContactFinder:
     """
 
     def __init__(self, shapes: Shapes, pairs: Indices) -> None:
-        self._shapes, self._pairs = block(shapes), pairs
+        self._shapes = block(shapes)
+        self._pairs = pairs
         self._make_room(FIRST_ROOM)
 
     def _make_room(self, contacts: int) -> None:

@@ -15,20 +15,26 @@ import numpy as np
 
 from iapb.numerics.schema import Booleans, Floats, Indices, Integers, States
 
-HALF_PLANE, CIRCLE, POLYGON = 0, 1, 2
-HALF_SPACE, SPHERE, BOX = 3, 4, 5
+HALF_PLANE = 0
+CIRCLE = 1
+POLYGON = 2
+HALF_SPACE = 3
+SPHERE = 4
+BOX = 5
 ENDLESS = (HALF_PLANE, HALF_SPACE)  # always of the static world
 WORLD = -1  # the body index of the static world
 
 # Largest number of contacts of one pair: a face on a face keeps four, a box on a half-space has
 # eight corners.
-BOX_PAIR_CONTACTS, BOX_CORNERS = 4, 8
+BOX_PAIR_CONTACTS = 4
+BOX_CORNERS = 8
 # Extra rows of the buffer: clipping a face writes all corners of the overlap before it keeps four.
 CLIPPING_ROOM = 24
 # In a scene with many shapes not all pairs can touch at once: `CONTACTS_PER_SHAPE` is six
 # neighbours with four contacts each. Up to `SMALL_CAPACITY` contacts the buffer has room for the
 # contacts of every pair.
-CONTACTS_PER_SHAPE, SMALL_CAPACITY = 24, 4096
+CONTACTS_PER_SHAPE = 24
+SMALL_CAPACITY = 4096
 
 
 class Shapes(NamedTuple):
@@ -108,7 +114,8 @@ def make_shapes(given: Sequence[Shape], space: bool) -> Shapes:
     kind, body, radius, vertices, center, axes, half_size = (
         zip(*given, strict=True) if given else [()] * 7
     )
-    count, n = np.array([len(rows) for rows in vertices], np.int32), len(given)
+    count = np.array([len(rows) for rows in vertices], np.int32)
+    n = len(given)
     return Shapes(
         np.array(kind, np.int32),
         np.array(body, np.int32),
@@ -132,7 +139,8 @@ def candidate_pairs(shapes: Shapes) -> Indices:
     index is a, so that all contacts of two bodies have normals of equal sense.
     """
     i, j = np.triu_indices(len(shapes.kind), 1)
-    one, other = shapes.body[i], shapes.body[j]
+    one = shapes.body[i]
+    other = shapes.body[j]
     swapped = (one < 0) | (0 <= other) & (other < one)
     pairs = np.column_stack([np.where(swapped, j, i), np.where(swapped, i, j)])
     return pairs[one != other].astype(np.int32)

@@ -33,11 +33,9 @@ from iapb.numerics.schema import Floats, zeros_of
 
 Arrays = tuple[Floats, Floats, Floats]  # M (d, d), J (c, d), v (d,), or n of each
 METHODS = ("factored", "poisson")
-NEWTON, POISSON, COULOMB = (
-    "Newton, equality",
-    "Poisson, two LCPs",
-    "Newton, equality, with Coulomb friction",
-)
+NEWTON = "Newton, equality"
+POISSON = "Poisson, two LCPs"
+COULOMB = "Newton, equality, with Coulomb friction"
 _STATUS = (
     "complete",
     "budget",
@@ -316,10 +314,13 @@ def _resolve_one(
 ) -> Impact:
     """Resolve one impact; `rough`: tangents (c m, d), friction, and m."""
     M, J, v = arrays
-    (contacts, d), (budget, clamped, tolerance) = J.shape, options
+    (contacts, d) = J.shape
+    (budget, clamped, tolerance) = options
     directions = rough[2] if rough else 0
     one = _batch_for_one(contacts, d, directions, unequal is not None)
-    one.mass[...], one.jacobian[...], one.velocity[...] = M, J, v
+    one.mass[...] = M
+    one.jacobian[...] = J
+    one.velocity[...] = v
     batch = one.batch
     batch.restitution[0] = restitution
     if unequal is not None:
@@ -380,10 +381,13 @@ class _One:
 
     def __init__(self, c: int, d: int, directions: int, unequal: bool) -> None:
         self.batch = batch = make_batch(1, c, d, directions, unequal)
-        self.mass, self.jacobian = batch.masses[0], batch.jacobians[0]
-        self.velocity, self.after = batch.velocities[0], batch.out.velocity[0]
+        self.mass = batch.masses[0]
+        self.jacobian = batch.jacobians[0]
+        self.velocity = batch.velocities[0]
+        self.after = batch.out.velocity[0]
         self.generalized_impulse = batch.out.generalized_impulse[0]
-        self.impulses, self.numbers = batch.out.impulses[0], batch.out.numbers[0]
+        self.impulses = batch.out.impulses[0]
+        self.numbers = batch.out.numbers[0]
         self.tangential = batch.out.tangential.reshape(c, directions)
 
 
@@ -394,7 +398,8 @@ class _Kept(threading.local):
         self.of_size: dict[tuple[int, int, int, bool], _One] = {}
 
 
-_KEPT, _MOST_KEPT = _Kept(), 256
+_KEPT = _Kept()
+_MOST_KEPT = 256
 
 
 def _batch_for_one(*size: Any) -> _One:
@@ -414,7 +419,9 @@ def diagnose(M: Floats, J: Floats, v: Floats, out: Any, refused: int, many: bool
     It names the first wrong entry of M, v or J, else the result that is out of range.
     """
     names, lead = (_MANY, (refused,)) if many else (_ONE, ())
-    M, J, v = M[refused], J[refused], v[refused]
+    M = M[refused]
+    J = J[refused]
+    v = v[refused]
 
     def named(name: str, *place: Any) -> str:
         return f"{name}[{', '.join(map(str, (*lead, *place)))}]" if lead or place else name
@@ -458,8 +465,10 @@ def diagnose(M: Floats, J: Floats, v: Floats, out: Any, refused: int, many: bool
 def _checked(names: tuple[str, str, str], mass_matrix: Any, jacobian: Any, velocity: Any) -> Arrays:
     """Return the arrays of one impact as doubles, or of many if the names are those of many."""
     many = names is _MANY
-    M, v = _array(names[0], mass_matrix, 2 + many), _array(names[2], velocity, 1 + many)
-    lead, d = v.shape[:many], M.shape[-1]
+    M = _array(names[0], mass_matrix, 2 + many)
+    v = _array(names[2], velocity, 1 + many)
+    lead = v.shape[:many]
+    d = M.shape[-1]
     if d == 0 or M.shape != (*lead, d, d):
         each = " for each line of velocities" if many else ""
         raise ArgumentError(names[0], M.shape, f"a square matrix with at least one row{each}")

@@ -23,14 +23,13 @@ INTEGRATORS = ("momentum", "semi_implicit_euler")  # of a scene: see `iapb.conta
 RENDERINGS = ("full", "saturate", "scale", "spread")
 
 # Parts of a scene's contact section. A law's attribute `uses` names the parts that affect it.
-PENALTY, IMPULSES, FRICTION, CLUSTERS, NEWNESS = (
-    "penalty",
-    "impulses",
-    "friction",
-    "clusters",
-    "newness",
-)
-IMPACT_FRICTION, OWN_RESTITUTION = "impact friction", "own restitution"
+PENALTY = "penalty"
+IMPULSES = "impulses"
+FRICTION = "friction"
+CLUSTERS = "clusters"
+NEWNESS = "newness"
+IMPACT_FRICTION = "impact friction"
+OWN_RESTITUTION = "own restitution"
 JOINT_FRICTION = "joint friction"
 TOUCH = "touch"  # impacts at the moment of touch
 JOINTS = "joints"  # damping and limits of joints: a law that does not name this part ignores them
@@ -52,7 +51,8 @@ class StepResult(NamedTuple):
 
 def copied_step(system: Any, state: State) -> StepResult:
     """Return copies of the results of the step that `state` has just made."""
-    states, tool = state.state_of_tree, system.tool_tree
+    states = state.state_of_tree
+    tool = system.tool_tree
     # As the kernel `contact_state` does, without numba's look-up of types.
     told = (
         states[tool]

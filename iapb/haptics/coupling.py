@@ -22,7 +22,8 @@ from iapb.errors import ArgumentError
 class NoCoupling:
     """The hand holds the tool directly; there is no device."""
 
-    name, kind = "none", 0
+    name = "none"
+    kind = 0
     settings: ClassVar[dict[str, Any]] = {}
 
 
@@ -51,14 +52,16 @@ class _PositionCoupling:
 class FourChannel(_PositionCoupling):
     """Four-channel controller: two position channels (PD), two force channels (F_h, F_env)."""
 
-    name, kind = "four-channel", 1
+    name = "four-channel"
+    kind = 1
 
 
 class UnilateralCoupler(_PositionCoupling):
     """PD between device and tool while the tool is in contact; apart from it only the hand acts on
     the device."""
 
-    name, kind = "unilateral", 2
+    name = "unilateral"
+    kind = 2
 
 
 Coupling = NoCoupling | FourChannel | UnilateralCoupler

@@ -92,7 +92,9 @@ class SimulatedDevice:
                 "mass_matrix", mass_matrix, "a symmetric positive definite matrix (d, d)"
             )
         size = len(mass)
-        self.q, self.v, self.hand_force = np.full(size, q), np.full(size, v), np.zeros(size)
+        self.q = np.full(size, q)
+        self.v = np.full(size, v)
+        self.hand_force = np.zeros(size)
         self._damping, self._limit, self._resolution = (
             np.full(size, x) for x in (damping, force_limit, resolution)
         )
@@ -152,7 +154,10 @@ class DeviceLink:
             raise ArgumentError(
                 "device", device, "an object with read() and apply(force), see iapb.haptics.device"
             )
-        self.device, self._world, self._state, self._port = device, world, state, port
+        self.device = device
+        self._world = world
+        self._state = state
+        self._port = port
         self._engage = Entry(engage)
         self._read()
 
@@ -162,7 +167,9 @@ class DeviceLink:
 
         A `SimulatedDevice` also gets the force of the simulated hand.
         """
-        world, state, port = self._world, self._state, self._port
+        world = self._world
+        state = self._state
+        port = self._port
         if isinstance(self.device, SimulatedDevice):
             self.device.hand_force = port.device_hand_force.copy()
         self.device.apply(port.device_force.copy())

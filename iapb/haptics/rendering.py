@@ -23,7 +23,9 @@ from iapb.numerics.linalg import add, cholesky, dot, load, solve_mass, transform
 from iapb.numerics.schema import Booleans, Floats, Integers
 from iapb.run import FREE
 
-NO_COUPLING, FOUR_CHANNEL, UNILATERAL = 0, 1, 2
+NO_COUPLING = 0
+FOUR_CHANNEL = 1
+UNILATERAL = 2
 PLANNED = 512  # steps for which a time-varying hand force is planned ahead; no chunk is longer
 
 
@@ -116,13 +118,17 @@ def sense(world, port, velocity):
     The first velocity is exact. Sensors of quaternions and of (cos, sin) count whole steps in the
     joint's tangent.
     """
-    first, m = port.clock[0] == 0, port.mechanism
+    first = port.clock[0] == 0
+    m = port.mechanism
     difference(m, port.sensed_q, port.device_q, port.error)
     for b in range(m.kind.shape[0]):
-        i, k, vector = m.q_start[b], m.v_start[b], is_vector(m.kind[b])
+        i = m.q_start[b]
+        k = m.v_start[b]
+        vector = is_vector(m.kind[b])
         for j in range(own_count(m, b)):
             step = port.resolution[k + j]
-            exact, moved = step == 0.0, port.error[k + j]
+            exact = step == 0.0
+            moved = port.error[k + j]
             if vector:
                 read = port.device_q[i + j] if exact else round(port.device_q[i + j] / step) * step
                 moved = read - port.sensed_q[i + j]
@@ -171,8 +177,10 @@ def couple(world, state, port):
 @kernel
 def press(mechanism, body, held, port, out):
     """Add J_hᵀF_h of the wrench at the held point to `out`."""
-    wrench, arm = port.wrench, port.hand_point
-    force, torque = (wrench[0], wrench[1], wrench[2]), (wrench[3], wrench[4], wrench[5])
+    wrench = port.wrench
+    arm = port.hand_point
+    force = (wrench[0], wrench[1], wrench[2])
+    torque = (wrench[3], wrench[4], wrench[5])
     point = add(load(body.position, held), transform(body.rotation, held, (arm[0], arm[1], arm[2])))
     add_point_force(mechanism, body, held, point, force, out)
     k = mechanism.last_dof[held]
@@ -289,7 +297,8 @@ def inside(world, state, port):
         state.scratch_contacts,
     )
     for i in range(max(count, 0)):
-        a, b = state.scratch_contacts.body_a[i], state.scratch_contacts.body_b[i]
+        a = state.scratch_contacts.body_a[i]
+        b = state.scratch_contacts.body_b[i]
         if world.tree_of_body[a] == port.tool_tree or (
             b >= 0 and world.tree_of_body[b] == port.tool_tree
         ):

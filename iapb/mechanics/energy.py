@@ -56,11 +56,9 @@ def impact_losses(mechanism: Mechanism, q: Floats, v: Floats, impulse: Floats) -
     The loss is -(v . P + P . M^-1 P / 2). This is exact also if the clamp or a force limit removed
     part of the impulse.
     """
-    losses, change, lower = (
-        np.zeros(len(impulse)),
-        np.zeros(mechanism.nv),
-        np.zeros((mechanism.nv, mechanism.nv)),
-    )
+    losses = np.zeros(len(impulse))
+    change = np.zeros(mechanism.nv)
+    lower = np.zeros((mechanism.nv, mechanism.nv))
     for k in np.flatnonzero(impulse.any(axis=1)):
         mass_matrix = mechanism.mass_matrix(q[0 if mechanism.has_constant_mass_matrix else k])
         losses[k] = _impact_loss(mass_matrix, lower, v[k], impulse[k], change)
@@ -111,7 +109,8 @@ def energy_ledger(
         Shapes of arrays that do not agree.
     """
     kinetic, potential = mechanism.energies(q, v, gravity)
-    displacement, before = mechanism.displacements(q, straight), before or {}
+    displacement = mechanism.displacements(q, straight)
+    before = before or {}
     for name, force in {**forces, "impulse": impulse}.items():
         if np.shape(force) != displacement.shape:
             raise ArgumentError(f"{name} of shape", np.shape(force), str(displacement.shape))
@@ -151,7 +150,8 @@ def moved_straight(run: Run) -> bool:
 def lost_within(run: Run) -> Floats:
     """Return the energy lost in the impacts of each step (n,) [J]; NaN where none happens within
     the step."""
-    impacts, lost = run.impacts, np.zeros(run.steps)
+    impacts = run.impacts
+    lost = np.zeros(run.steps)
     step = impacts.step - round(float(run.time[0]) / run.dt)
     np.add.at(lost, step, impacts.energy_lost)
     lost[np.setdiff1d(np.arange(run.steps), step[impacts.time > impacts.step * run.dt])] = np.nan
@@ -172,7 +172,8 @@ def energy_of_run(
     device: the energy that has entered the system through the hand's port) and
     `device_actuator_work` (n,), all [J].
     """
-    forces, before = {name: getattr(run, f"{name}_force") for name in FORCES}, before or {}
+    forces = {name: getattr(run, f"{name}_force") for name in FORCES}
+    before = before or {}
     ledger = energy_ledger(
         mechanism,
         gravity,

@@ -114,7 +114,8 @@ class Mechanism:
         self.velocity_units = tuple(
             "rad/s" if turns else "m/s" for _, kind in layouts for turns in kind.rotating
         )
-        self.nq, self.nv = len(self.coordinate_names), len(self.velocity_names)
+        self.nq = len(self.coordinate_names)
+        self.nv = len(self.velocity_names)
         self.arrays: MechanismArrays = structure.collect_arrays(self.bodies, parents)
         self.block: Any = block(self.arrays)
         self.tree_of_body: Integers = np.array(trees, np.int64)
@@ -192,7 +193,8 @@ class Mechanism:
 
     def mass_matrix(self, q: ArrayLike) -> Floats:
         """Return M(q) (d, d)."""
-        place, out = float_array("q", q, (self.nq,)), np.empty((1, self.nv, self.nv))
+        place = float_array("q", q, (self.nq,))
+        out = np.empty((1, self.nv, self.nv))
         if not _KERNELS.mass_matrices_at(self._parts, self._scratch.parts, place[None], out):
             self._place(place)
         return out[0]
@@ -218,7 +220,8 @@ class Mechanism:
     def unmoved_velocity(self, q: ArrayLike) -> int | None:
         """Return the first velocity that moves no mass of its own, so that M(q) is not positive
         definite; None: M is."""
-        mass, lower = self.mass_matrix(q), np.zeros((self.nv, self.nv))
+        mass = self.mass_matrix(q)
+        lower = np.zeros((self.nv, self.nv))
         _KERNELS.cholesky(mass, lower)
         least = np.maximum(ROUNDED * np.diagonal(mass), LIGHTEST)
         unmoved = np.flatnonzero(np.diagonal(lower) ** 2 < least)
@@ -227,7 +230,8 @@ class Mechanism:
     def bias(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """Return B(q, v) (d,), Coriolis and centripetal generalized forces (gravity not
         included)."""
-        place, rates = float_array("q", q, (self.nq,)), float_array("v", v, (self.nv,))
+        place = float_array("q", q, (self.nq,))
+        rates = float_array("v", v, (self.nv,))
         out = np.empty((1, self.nv))
         if not _KERNELS.biases_at(self._parts, self._scratch.parts, place[None], rates[None], out):
             self._place(place)
@@ -269,7 +273,8 @@ class Mechanism:
     def frame_jacobian(self, q: ArrayLike, body: int | str) -> Floats:
         """Return J (6, d): velocity of the body's origin (rows 0-2) and angular velocity (rows
         3-5), in world axes."""
-        at, b = self._at(q), self.index(body)
+        at = self._at(q)
+        b = self.index(body)
         return self._filled((6, self.nv), _KERNELS.frame_jacobian, at, b, at.position[b])
 
     def rows_along(
@@ -280,14 +285,10 @@ class Mechanism:
 
         Body -1 is the world, which does not move.
         """
-        places, fixed_to = (
-            float_array("qs", qs, (-1, self.nq)),
-            np.ascontiguousarray(bodies, np.int64),
-        )
-        spots, along = (
-            float_array("points", points, (-1, 3)),
-            float_array("directions", directions, (-1, 3)),
-        )
+        places = float_array("qs", qs, (-1, self.nq))
+        fixed_to = np.ascontiguousarray(bodies, np.int64)
+        spots = float_array("points", points, (-1, 3))
+        along = float_array("directions", directions, (-1, 3))
         if not len(places) == len(fixed_to) == len(spots) == len(along):
             raise ArgumentError(
                 "bodies, points and directions", len(spots), f"{len(places)} each, as many as qs"
@@ -302,10 +303,8 @@ class Mechanism:
         """Return kinetic and potential energy (n,) [J] at n states, qs (n, nq) and vs (n, d), for
         the field g (3,)."""
         places, rates = self._states(qs, vs)
-        field, (kinetic, potential) = (
-            finite_array("g", g, (3,), "m/s^2"),
-            np.zeros((2, len(places))),
-        )
+        field = finite_array("g", g, (3,), "m/s^2")
+        (kinetic, potential) = np.zeros((2, len(places)))
         _KERNELS.energies_along(
             self.block, self._scratch.workspace, places, rates, field, kinetic, potential
         )
@@ -358,7 +357,8 @@ class Mechanism:
         b = _KERNELS.misplaced_body(self.block, place)
         if b >= 0:
             finite_array(name, q, (self.nq,))
-            first, units = int(self.arrays.q_start[b]), self.bodies[b].joint.layout.coordinate_units
+            first = int(self.arrays.q_start[b])
+            units = self.bodies[b].joint.layout.coordinate_units
             of_unit = [first + i for i, unit in enumerate(units) if unit == "1"]
             raise ArgumentError(
                 f"{name} of body {self.names[b]!r}", place[of_unit], "entries of total length one"
@@ -367,7 +367,8 @@ class Mechanism:
 
     def _states(self, qs: ArrayLike, vs: ArrayLike) -> tuple[Floats, Floats]:
         """Return as many configurations (n, nq) as velocities (n, d), or raise ArgumentError."""
-        places, rates = float_array("qs", qs, (-1, self.nq)), float_array("vs", vs, (-1, self.nv))
+        places = float_array("qs", qs, (-1, self.nq))
+        rates = float_array("vs", vs, (-1, self.nv))
         if len(places) != len(rates):
             raise ArgumentError("vs of shape", rates.shape, f"as many rows as qs, {len(places)}")
         return places, rates

@@ -25,30 +25,39 @@ from iapb.numerics.schema import Floats, Integers
 
 def collect_arrays(bodies: tuple[Body, ...], parents: list[int]) -> MechanismArrays:
     """Return the bodies as contiguous arrays; parents (n,) are body indices, -1 = world."""
-    layouts, count = [body.joint.layout for body in bodies], len(bodies)
+    layouts = [body.joint.layout for body in bodies]
+    count = len(bodies)
     follows = np.array([body.mimic is not None for body in bodies], np.bool_)
     v_count = np.array([layout.nv for layout in layouts], np.int64)
     q_own = np.where(follows, 0, np.array([layout.nq for layout in layouts], np.int64))
     v_own = np.where(follows, 0, v_count)
-    q_start, v_start, total = np.cumsum(q_own) - q_own, np.cumsum(v_own) - v_own, int(v_own.sum())
+    q_start = np.cumsum(q_own) - q_own
+    v_start = np.cumsum(v_own) - v_own
+    total = int(v_own.sum())
     v_start[follows] = total + np.arange(follows.sum())
     motions = int(v_count.sum())
     last_dof: list[int] = []  # of each body, on the path from the world
     dof_parent, dof_body = np.zeros((2, motions), np.int64)
     dof_rotates = np.zeros(motions, np.bool_)
-    dof_leader, dof_ratio = np.arange(motions), np.ones(motions)
+    dof_leader = np.arange(motions)
+    dof_ratio = np.ones(motions)
     dof_offset = np.zeros(motions)
     for b, (parent, layout) in enumerate(zip(parents, layouts, strict=True)):
         last = last_dof[parent] if parent >= 0 else -1
         for k, turns in enumerate(layout.rotating, int(v_start[b])):
-            dof_parent[k], dof_body[k], dof_rotates[k] = last, b, turns
+            dof_parent[k] = last
+            dof_body[k] = b
+            dof_rotates[k] = turns
             last = k
         last_dof.append(last)
     for b in np.flatnonzero(follows).tolist():
-        mimic, k = bodies[b].mimic or Mimic(""), v_start[b]
+        mimic = bodies[b].mimic or Mimic("")
+        k = v_start[b]
         leader = _leader(bodies, mimic.body)
-        q_start[b], dof_leader[k] = q_start[leader], v_start[leader]
-        dof_ratio[k], dof_offset[k] = mimic.multiplier, mimic.offset
+        q_start[b] = q_start[leader]
+        dof_leader[k] = v_start[leader]
+        dof_ratio[k] = mimic.multiplier
+        dof_offset[k] = mimic.offset
     return MechanismArrays(
         kind=np.array([layout.code for layout in layouts], np.int64),
         parent=np.array(parents, np.int64),
@@ -97,14 +106,17 @@ def moving_parts(m: MechanismArrays) -> MechanismArrays:
     ] = []  # joint frame of each body in the frame of its parent's carrier
     own: list[tuple[Floats, Floats]] = []  # its axes and origin in its carrier's frame
     for b, parent in enumerate(m.parent.tolist()):
-        rotation, position = m.placement_rotation[b], m.placement_position[b]
+        rotation = m.placement_rotation[b]
+        position = m.placement_position[b]
         if parent >= 0 and not moves[parent]:
             turn, shift = own[parent]
-            rotation, position = product(turn, rotation), shift + product(turn, position)
+            rotation = product(turn, rotation)
+            position = shift + product(turn, position)
         placed.append((rotation, position))
         own.append((np.eye(3), np.zeros(3)) if moves[b] else placed[b])
         carrier.append(b if moves[b] else carrier[parent] if parent >= 0 else -1)
-    moving, carriers = np.flatnonzero(moves), np.array(carrier)
+    moving = np.flatnonzero(moves)
+    carriers = np.array(carrier)
     new_index = {b: i for i, b in enumerate(moving.tolist())} | {-1: -1}
     parts = m._replace(
         **{
@@ -172,7 +184,8 @@ def _rotation_keeps_mass_matrix(parts: MechanismArrays, b: int) -> bool:
     mass lies on the axis (at the centre of a spherical joint). A free flyer has velocities in body
     axes, so at the root its M is the inertia of the body itself.
     """
-    kind, carried = parts.kind[b], parts.parent[b] >= 0
+    kind = parts.kind[b]
+    carried = parts.parent[b] >= 0
     if b in parts.parent:
         return False
     if kind == FREE_FLYER:
@@ -209,17 +222,16 @@ def make_free_motion(m: MechanismArrays, tree_of_body: Integers) -> FreeMotion:
         False,
         False,
     )
-    parts, carriers = moving_parts(m), np.flatnonzero(m.v_count)
+    parts = moving_parts(m)
+    carriers = np.flatnonzero(m.v_count)
     for t in range(count):
         moving = np.flatnonzero(tree_of_body[carriers] == t).tolist()
         if not moving:
             continue
         first = moving[0]
-        kind, center, inertia = (
-            int(parts.kind[first]),
-            parts.center_of_mass[first],
-            parts.inertia[first],
-        )
+        kind = int(parts.kind[first])
+        center = parts.center_of_mass[first]
+        inertia = parts.inertia[first]
         found.root[t] = carriers[first]
         if len(moving) == 1 and kind in (FREE_FLYER, SPHERICAL):
             found.kind[t] = RIGID
@@ -245,7 +257,8 @@ def principal_axes(inertia: Floats) -> tuple[Floats, Floats]:
 
     Without LAPACK: the same bits on every processor.
     """
-    matrix, axes = np.array(inertia, np.float64), np.eye(3)
+    matrix = np.array(inertia, np.float64)
+    axes = np.eye(3)
     for _ in range(30):
         i, j = max(((0, 1), (0, 2), (1, 2)), key=lambda at: abs(matrix[at]))
         if abs(matrix[i, j]) <= 1e-17 * (abs(matrix[i, i]) + abs(matrix[j, j])):

@@ -65,7 +65,8 @@ _ATTRIBUTES: dict[str, tuple[str, ...]] = {
 _MANY = ("link", "joint")  # an element may hold several of these
 _SHAPES = ("visual", "collision")
 # share of letters that agree: inertail and xzy are errors, contact and rpy of an axis other words
-_NEAR, _NEAR_ATTRIBUTE = 0.75, 0.6
+_NEAR = 0.75
+_NEAR_ATTRIBUTE = 0.6
 MAX_BYTES = 10_000_000  # the largest known robot file has a tenth of this
 FARTHEST = 1e9  # m, rad: a bound beyond it is none, as of rotors that say 1e16
 
@@ -143,7 +144,9 @@ def read_robot(
         raise ArgumentError("links without a parent", roots, "exactly one, the root")
     base = Joint("free_flyer" if floating_base else "fixed")
     links = [Link(Body(roots[0], None, base, _HERE, *inertials[roots[0]]), roots[0])]
-    stack, reached = children[roots[0]][::-1], set(roots)  # instead of recursion, for any depth
+    # instead of recursion, for any depth
+    stack = children[roots[0]][::-1]
+    reached = set(roots)
     while stack:
         link = stack.pop()
         reached.add(link)
@@ -202,7 +205,8 @@ def _with_plane(link: Link) -> list[Link]:
     body = link.body
     if body.joint.kind != "planar" or body.joint.axis == (0.0, 0.0, 1.0):
         return [link]
-    turn, (rotation, position) = _to_axis(body.joint.unit_axis), body.placement
+    turn = _to_axis(body.joint.unit_axis)
+    (rotation, position) = body.placement
     frame = Body(
         f"{body.name}_plane", body.parent, Joint("planar"), (product(rotation, turn), position)
     )
@@ -223,7 +227,8 @@ class _Joints:
     """Reads what joints have beside their kind, and keeps what is to be said about it."""
 
     def __init__(self, elements: dict[str, ElementTree.Element], ignored: Counter[str]) -> None:
-        self.elements, self.ignored = elements, ignored
+        self.elements = elements
+        self.ignored = ignored
         self.empty: list[str] = []  # joints whose range is a point
         self.unlimited: list[str] = []
 
@@ -238,13 +243,15 @@ class _Joints:
 
     def _mimic(self, element: ElementTree.Element, name: str) -> Mimic | None:
         """Return what a joint follows; a fixed joint follows nothing."""
-        mimic, kind = element.find("mimic"), element.get("type")
+        mimic = element.find("mimic")
+        kind = element.get("type")
         if mimic is None:
             return None
         if kind == "fixed":
             self.ignored["<mimic> of fixed joints"] += 1
             return None
-        where, leader = f"{where_of(element)} mimic", mimic.get("joint", "")
+        where = f"{where_of(element)} mimic"
+        leader = mimic.get("joint", "")
         found = self.elements.get(leader)
         leads = found is not None and found.get("type") in WITH_RANGE
         child = found.find("child") if found is not None and found.find("mimic") is None else None
@@ -256,7 +263,9 @@ class _Joints:
         return Mimic(child.get("link", ""), multiplier, _number(where, mimic, "offset", "0"))
 
     def _limits(self, element: ElementTree.Element) -> tuple[float, float] | None:
-        limit, kind, name = element.find("limit"), element.get("type"), str(element.get("name"))
+        limit = element.find("limit")
+        kind = element.get("type")
+        name = str(element.get("name"))
         if kind not in WITH_RANGE:
             self.ignored[f"<limit> of {kind} joints"] += limit is not None
             return None
@@ -274,7 +283,8 @@ class _Joints:
 
     def _dynamics(self, element: ElementTree.Element, name: str) -> float:
         """Return damping or friction of a joint."""
-        dynamics, kind = element.find("dynamics"), element.get("type")
+        dynamics = element.find("dynamics")
+        kind = element.get("type")
         if dynamics is None:
             return 0.0
         where = f"{where_of(element)} dynamics"
@@ -319,10 +329,12 @@ def _number(where: str, element: ElementTree.Element, name: str, default: str) -
 def _inertial(link: ElementTree.Element) -> tuple[Any, ...]:
     """Return mass, centre of mass and inertia about it, in link axes; nothing if there is no
     <inertial>."""
-    inertial, where = link.find("inertial"), f"{where_of(link)} inertial"
+    inertial = link.find("inertial")
+    where = f"{where_of(link)} inertial"
     if inertial is None:
         return ()
-    mass, tensor = inertial.find("mass"), inertial.find("inertia")
+    mass = inertial.find("mass")
+    tensor = inertial.find("inertia")
     if mass is None or tensor is None:
         raise ArgumentError(where, "incomplete", "a <mass> and an <inertia>")
     rotation, center = origin_of(inertial, where)
@@ -337,7 +349,9 @@ def _inertial(link: ElementTree.Element) -> tuple[Any, ...]:
 
 
 def _joint(element: ElementTree.Element) -> Joint:
-    where, kind, axis = where_of(element), element.get("type", ""), element.find("axis")
+    where = where_of(element)
+    kind = element.get("type", "")
+    axis = element.find("axis")
     if kind not in KIND_OF_TYPE:
         leaving = _leaving(str(element.get("name")), "joint")
         raise ArgumentError(f"{where} type", kind, f"{one_of(kind, KIND_OF_TYPE)}; {leaving}")

@@ -51,7 +51,8 @@ def add_product(hi, lo, a_hi, a_lo, b):
 def symmetric_entry(matrix, i, j):
     """Return entry (i, j) of ½ (M + Mᵀ) as an exact pair, which is M[i, j] and 0 if M is
     symmetric."""
-    entry, mirrored = matrix[i, j], matrix[j, i]
+    entry = matrix[i, j]
+    mirrored = matrix[j, i]
     if entry == mirrored:
         return entry, 0.0
     return two_sum(0.5 * entry, 0.5 * mirrored)
@@ -97,7 +98,8 @@ def least_energy(mass_matrix, v, change):
 
     The vectors are scaled first, so that their squares neither under- nor overflow.
     """
-    v_unit, change_unit = unit_of(v), unit_of(change)
+    v_unit = unit_of(v)
+    change_unit = unit_of(change)
     cross, square = quadratic_forms(mass_matrix, v, change, v_unit, change_unit)
     return -cross / square * (change_unit / v_unit) if square > 0.0 and cross < 0.0 else 0.0
 

@@ -67,7 +67,8 @@ def _sine_cosine_pairs(angle):
         # the rounded 2π changes the angle by less than its own rounding error
         angle = math.copysign(abs(angle) % (4.0 * _QUARTER[0]), angle)
     turns = math.floor(angle / _QUARTER[0] + 0.5) if abs(angle) > 0.5 * _QUARTER[0] else 0
-    h, l = angle, 0.0
+    h = angle
+    l = 0.0
     if turns != 0:
         for part in _QUARTER:
             h, l = add_product(h, l, part, 0.0, -float(turns))
@@ -75,7 +76,10 @@ def _sine_cosine_pairs(angle):
     if turns & 1:
         s, t, c, d = c, d, -s, -t
     if turns & 2:
-        s, t, c, d = -s, -t, -c, -d
+        s = -s
+        t = -t
+        c = -c
+        d = -d
     return s, t, c, d
 
 
@@ -102,15 +106,18 @@ def arc_tangent(y, x):
 
     A series gives nine digits. One step of Newton's method on y cos a − x sin a gives the others.
     """
-    across, along = abs(y), abs(x)
+    across = abs(y)
+    along = abs(x)
     if across < 2.0**-30 * along and x > 0.0:
         return y / x  # the cubic term is below the rounding error
     if not (across > 0.0 or along > 0.0):
         return 0.0 * y
     # tangent of half the angle from the nearer axis, at most tan 22.5°
-    small, large = min(across, along) / max(across, along), 1.0
+    small = min(across, along) / max(across, along)
+    large = 1.0
     small = small / (1.0 + math.sqrt(1.0 + small * small))
-    square, series = small * small, 0.0
+    square = small * small
+    series = 0.0
     for n in range(_TAN_22_5_DEGREES_TERMS, -1, -1):
         series = large / (2.0 * n + 1.0) - square * series
     first = 2.0 * small * series
@@ -121,7 +128,8 @@ def arc_tangent(y, x):
     first = math.copysign(first, y)
     s, t, c, d = _sine_cosine_pairs(first)
     scale = _power_of_two(max(across, along))
-    rise, run = scale * y, scale * x
+    rise = scale * y
+    run = scale * x
     off, rest = add_product(0.0, 0.0, c, d, rise)
     off, rest = add_product(off, rest, s, t, -run)
     return first + (off + rest) / (run * c + rise * s)
@@ -134,7 +142,8 @@ def hypotenuse(x, y):
     if not (largest > 0.0 and math.isfinite(largest)):
         return largest + abs(x) + abs(y)
     scale = _power_of_two(largest)
-    x, y = scale * x, scale * y
+    x = scale * x
+    y = scale * y
     square, rest = two_product(x, x)
     square, rest = add_product(square, rest, y, 0.0, y)
     root = math.sqrt(square)

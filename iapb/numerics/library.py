@@ -106,7 +106,8 @@ def _python_function(code: Any, kinds: list[str], results: list[str]) -> Callabl
     code.argtypes = (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_char_p)
     code.restype = ctypes.c_int32
     names = [f"a{k}" for k in range(len(kinds))]
-    form, words = "", []
+    form = ""
+    words = []
     for name, kind in zip(names, kinds, strict=True):
         if "[" in kind:
             dimensions = int(kind.partition("[")[2].rstrip("]"))

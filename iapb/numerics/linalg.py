@@ -182,7 +182,8 @@ def cholesky_tree_blocks(matrix, start, stop, lower):
     """Do `cholesky` for each block of a block diagonal M; other entries of `lower` stay; return 0,
     or 1 on failure."""
     for t in range(start.shape[0]):
-        i, j = start[t], stop[t]
+        i = start[t]
+        j = stop[t]
         if cholesky(matrix[i:j, i:j], lower[i:j, i:j]) != 0:
             return 1
     return 0
@@ -269,7 +270,8 @@ def solve_tree_blocks(lower, start, stop, force, acceleration):
     """Do `solve_mass` for a block diagonal M, tree by tree: linear in the number of trees, with the
     same bits."""
     for t in range(start.shape[0]):
-        i, j = start[t], stop[t]
+        i = start[t]
+        j = stop[t]
         solve_mass(lower[i:j, i:j], force[i:j], acceleration[i:j])
 
 
@@ -278,7 +280,8 @@ def solve_tree_blocks(lower, start, stop, force, acceleration):
 
 def product(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
     """Return the product of a matrix (m, n) with a matrix (n, k) or a vector (n,): ``a @ b``."""
-    left, right = np.ascontiguousarray(a, np.float64), np.asarray(b, np.float64)
+    left = np.ascontiguousarray(a, np.float64)
+    right = np.asarray(b, np.float64)
     columns = np.ascontiguousarray(right if right.ndim == 2 else right[:, None])
     out = np.empty((left.shape[0], columns.shape[1]))
     _multiply(left, columns, out)

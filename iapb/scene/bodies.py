@@ -109,7 +109,8 @@ class Polygon(ScenePart):
         edges = [after - at for at, after in zip(corners, corners[1:] + corners[:1], strict=True)]
         turns = [cmath.phase(edges[i] * edges[i - 1].conjugate()) for i in range(len(edges))]
         if sum(turns) < 0.0:
-            vertices, turns = vertices[::-1], [-turn for turn in turns]
+            vertices = vertices[::-1]
+            turns = [-turn for turn in turns]
         once_around = abs(sum(turns) - 2.0 * math.pi) < 1.0  # the sum is a multiple of 2 pi
         require(
             once_around and all(math.sin(turn) > _STRAIGHT for turn in turns),
@@ -340,7 +341,8 @@ class AnyBody(ScenePart):
     @classmethod
     def _fits_the_joint(cls, given: Any, info: ValidationInfo) -> Any:
         """Check a field whose values depend on the kind of joint, and fill in the start."""
-        field, joint = info.field_name, info.data.get("joint")
+        field = info.field_name
+        joint = info.data.get("joint")
         if joint is None:
             return given
         kind = KINDS[joint]
@@ -494,17 +496,20 @@ def _mass_of(shape: Any, density: float) -> tuple[float, Any, Any]:
         mass, own, about = _polygon(np.array(shape.vertices), density)
         turn = rotation_of((0.0, 0.0, shape.angle))[:2, :2]
         return mass, center + (turn * own).sum(axis=1), about
-    mass, squares = density * math.prod(shape.size), np.array(shape.size) ** 2
+    mass = density * math.prod(shape.size)
+    squares = np.array(shape.size) ** 2
     if len(center) == 2:
         return mass, center, mass * squares.sum() / 12.0
-    turn, principal = rotation_of(shape.rpy), mass * (squares.sum() - squares) / 12.0
+    turn = rotation_of(shape.rpy)
+    principal = mass * (squares.sum() - squares) / 12.0
     return mass, center, sum(principal[k] * np.outer(turn[:, k], turn[:, k]) for k in range(3))
 
 
 def _polygon(vertices: Any, density: float) -> tuple[float, Any, float]:
     """Return mass, centre and moment of inertia from the triangles between the first corner and
     each edge."""
-    a, b = vertices[1:-1] - vertices[0], vertices[2:] - vertices[0]
+    a = vertices[1:-1] - vertices[0]
+    b = vertices[2:] - vertices[0]
     masses = 0.5 * density * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
     mass = masses.sum()
     center = (masses[:, None] * (a + b)).sum(axis=0) / (3.0 * mass)

@@ -52,7 +52,9 @@ class Document:
         from ruamel.yaml import YAML
         from ruamel.yaml.error import YAMLError
 
-        self.file, self._what, self._count = file, what, 0
+        self.file = file
+        self._what = what
+        self._count = 0
         self.mistakes: list[Mistake] = []
         self._keys: dict[Path, tuple[int, int]] = {}
         if len(text) > MAX_CHARACTERS:
@@ -152,11 +154,9 @@ def _field_text(field: str) -> str:
     Plain.add_representer(str, Plain.represent_str)
     text, yaml = StringIO(), YAML(typ="safe", pure=True)  # type: tuple[StringIO, Any]
     yaml.Representer = Plain
-    yaml.default_flow_style, yaml.width, yaml.sort_base_mapping_type_on_output = (
-        None,
-        1_000_000,
-        False,
-    )
+    yaml.default_flow_style = None
+    yaml.width = 1_000_000
+    yaml.sort_base_mapping_type_on_output = False
     yaml.dump(
         literal_eval(field), text
     )  # with a nested list, or a single field would be written in braces

@@ -97,9 +97,11 @@ def _made(node: ast.expr) -> Function:
         case ast.Name(id="pi"):
             return lambda t: math.pi
         case ast.BinOp(left=left, op=op, right=right):
-            called, given = _OPERATORS.get(type(op)), [left, right]
+            called = _OPERATORS.get(type(op))
+            given = [left, right]
         case ast.UnaryOp(operand=operand, op=op):
-            called, given = _OPERATORS.get(type(op)), [operand]
+            called = _OPERATORS.get(type(op))
+            given = [operand]
         case ast.Call(func=ast.Name(id=name), args=given, keywords=[]) if name in FUNCTIONS:
             called, least = FUNCTIONS[name]
             if len(given) != least and not (least == 2 and len(given) > 2):

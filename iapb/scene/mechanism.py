@@ -48,7 +48,8 @@ def mechanism_of(scene: Scene) -> Mechanism:
 def _body_in_space(body: Any) -> Body:
     flat = len(body.origin) == 2
     mimic = body.joint_mimic
-    rotation, lift = np.eye(3), (0.0,) if flat else ()
+    rotation = np.eye(3)
+    lift = (0.0,) if flat else ()
     turn = _turn(body)
     rotation[: len(turn), : len(turn)] = turn
     return Body(
@@ -94,7 +95,8 @@ def joint_fault(scene: Scene) -> tuple[int, str, Any, str] | None:
             return i, "position", list(body.position), said
     if all(_moves_its_own(body) for body in scene.bodies):
         return None
-    mechanism, (q, _) = mechanism_of(scene), start_of(scene)
+    mechanism = mechanism_of(scene)
+    (q, _) = start_of(scene)
     k = mechanism.unmoved_velocity(q)
     if k is None:
         return None
@@ -124,7 +126,8 @@ def require_joints(scene: Scene) -> None:
 def wrench_of(scene: Scene, time: float) -> Floats:
     """Return force and torque (6,) of the scene's hand at a time [s] in world axes; zeros without a
     hand."""
-    wrench, force = np.zeros(6), scene.hand.force_at(time) if scene.hand is not None else [0.0] * 6
+    wrench = np.zeros(6)
+    force = scene.hand.force_at(time) if scene.hand is not None else [0.0] * 6
     wrench[[0, 1, 5] if len(force) == 3 else slice(None)] = force
     return wrench
 
@@ -183,15 +186,17 @@ def shapes_of(scene: Scene) -> Shapes:
     like a wall.
     """
     space = isinstance(scene, SpatialScene)
-    n, parents, made = 3 if space else 2, _parents(scene), []
+    n = 3 if space else 2
+    parents = _parents(scene)
+    made = []
     for body, _, shape in _owned_shapes(scene):
-        rotation, shift, link = np.eye(n), np.zeros(n), body
+        rotation = np.eye(n)
+        shift = np.zeros(n)
+        link = body
         while link >= 0 and scene.bodies[link].joint == "fixed":
             turn = _turn(scene.bodies[link])
-            rotation, shift = (
-                product(turn, rotation),
-                product(turn, shift) + scene.bodies[link].origin,
-            )
+            rotation = product(turn, rotation)
+            shift = product(turn, shift) + scene.bodies[link].origin
             link = parents[link]
         made.append(
             _placed(shape, -1, rotation, shift)
@@ -295,11 +300,9 @@ def stops_of(scene: Scene, mechanism: Mechanism) -> Stops:
     axis, of all bodies that it carries, in the pose of the start. The effective mass at the stop is
     then their whole mass, and stiffness and damping act as at a contact.
     """
-    parents, carried, arrays = (
-        _parents(scene),
-        [body.mass for body in scene.bodies],
-        mechanism.arrays,
-    )
+    parents = _parents(scene)
+    carried = [body.mass for body in scene.bodies]
+    arrays = mechanism.arrays
     for i, parent in reversed(list(enumerate(parents))):
         if parent >= 0:
             carried[parent] += carried[i]
@@ -314,10 +317,8 @@ def stops_of(scene: Scene, mechanism: Mechanism) -> Stops:
         math.sqrt(x / carried[i]) if x > 0.0 and carried[i] > 0.0 else 1.0
         for i, x in zip(limited, turned, strict=True)
     ]
-    body, bounds = (
-        np.repeat(np.array(limited, np.int64), 2),
-        [limits[i] or () for i in limited],
-    )
+    body = np.repeat(np.array(limited, np.int64), 2)
+    bounds = [limits[i] or () for i in limited]
     shape = len(_owned_shapes(scene)) + np.arange(len(body), dtype=np.int64)
     return Stops(
         body,

@@ -277,7 +277,8 @@ def _between(rows: tuple[tuple[float, ...], ...], time: float) -> list[float]:
     k = bisect.bisect_right(rows, time, key=lambda row: row[0])
     if k == 0 or k == len(rows):
         return list(rows[0 if k == 0 else -1][1:])
-    (start, *first), (stop, *last) = rows[k - 1], rows[k]
+    (start, *first) = rows[k - 1]
+    (stop, *last) = rows[k]
     share = (time - start) / (stop - start)
     return [a + share * (b - a) for a, b in zip(first, last, strict=True)]
 
@@ -417,7 +418,8 @@ class Scene(ScenePart):
     def source_text(self) -> str:
         """The YAML text of this scene; reading it gives the same values to the last bit."""
         if not self._source_text:
-            comment, self._about = f"# {self._about}\n" * bool(self._about), ""
+            comment = f"# {self._about}\n" * bool(self._about)
+            self._about = ""
             self._source_text = comment + yaml_text(self.resolved())
         return self._source_text
 
@@ -499,7 +501,8 @@ def _across_parts(given: Any) -> Mistakes:
     """
     if not isinstance(given, dict):
         return
-    bodies, walls = _mappings(given, "bodies"), _mappings(given, "walls")
+    bodies = _mappings(given, "bodies")
+    walls = _mappings(given, "walls")
     for where, items, known in (
         ("bodies", bodies, {WORLD: "the static world"}),
         ("walls", walls, {}),
@@ -510,7 +513,8 @@ def _across_parts(given: Any) -> Mistakes:
                 yield (where, i, "name"), name, f"a name of its own: {known[name]} has this one"
             elif name is not None:
                 known[name] = "an earlier one"
-    names, roots = [_text(body, "name") for body in bodies], _roots(bodies)
+    names = [_text(body, "name") for body in bodies]
+    roots = _roots(bodies)
     for i, body in enumerate(bodies):
         parent = _text(body, "parent", WORLD)
         if parent not in (None, WORLD) and parent not in names[:i]:
@@ -549,7 +553,8 @@ def _roots(bodies: list[dict[str, Any]]) -> list[str | None]:
     """Return the name of each body's root; None if names or parents are wrong."""
     root: dict[str | None, str | None] = {}
     for body in bodies:
-        name, parent = _text(body, "name"), _text(body, "parent", WORLD)
+        name = _text(body, "name")
+        parent = _text(body, "parent", WORLD)
         root.setdefault(name, name if parent == WORLD else root.get(parent))
     return [root[_text(body, "name")] for body in bodies]
 
@@ -574,7 +579,9 @@ def _tool(
 ) -> Mistakes:
     """Check that the hand's body exists and moves, and that its lists have one entry per coordinate
     of the tool."""
-    hand, gains, held = given.get("hand"), given.get("couplings"), _text(given.get("hand"), "body")
+    hand = given.get("hand")
+    gains = given.get("couplings")
+    held = _text(given.get("hand"), "body")
     sections: list[tuple[Path, Any]] = [(("device",), given.get("device"))]
     if hand is None:
         for path, section in (*sections, (("couplings",), gains)):
@@ -585,7 +592,8 @@ def _tool(
     if held not in names:
         yield ("hand", "body"), held, "the name of a body of this scene"
         return
-    root, joints = roots[names.index(held)], [_text(body, "joint") for body in bodies]
+    root = roots[names.index(held)]
+    joints = [_text(body, "joint") for body in bodies]
     if root is None or None in roots or not all(joint in KINDS for joint in joints):
         return
     coordinates = sum(

@@ -118,8 +118,11 @@ class ScenePart(BaseModel):
     def _explained(cls, error: Any) -> InitErrorDetails:
         """Turn pydantic's error into one whose message says what was expected, in terms of the
         scene file."""
-        kind, where, words = error["type"], error["loc"], error.get("ctx", {})
-        expected, value = error["msg"], error["input"]
+        kind = error["type"]
+        where = error["loc"]
+        words = error.get("ctx", {})
+        expected = error["msg"]
+        value = error["input"]
         if kind in _EXPECTED:
             expected = _EXPECTED[kind].format(**words)
             listed = re.findall("'([^']*)'", words.get("expected_tags", words.get("expected", "")))
@@ -132,7 +135,8 @@ class ScenePart(BaseModel):
             field = cls.model_fields.get(str(where[0])) if len(where) == 1 else None
             expected = f"this field: {field.description}" if field else "one item more in this list"
         if kind.startswith("union_tag"):
-            where, value = (*where, "kind"), value.get("kind")
+            where = (*where, "kind")
+            value = value.get("kind")
         value = MISSING if kind in ("missing", "union_tag_not_found") else value
         return InitErrorDetails(type=expectation(expected), loc=where, input=value)
 

@@ -75,7 +75,8 @@ def find_scene(name: str | Path, folder: str = "") -> Path:
     ours = scene_folder() / folder / f"{path.stem}.yaml"
     if str(name) in (path.stem, path.name) and isfile(ours):
         return ours
-    said, near = one_of(path.stem, scene_names(folder), "a file, or one of: "), ""
+    said = one_of(path.stem, scene_names(folder), "a file, or one of: ")
+    near = ""
     if path.suffix:  # a file was meant
         near = nearest(path.name, (file.name for file in path.parent.glob(f"*{path.suffix}")))
     raise ArgumentError(
@@ -148,7 +149,8 @@ def scene_from_text(text: str, file: str = "(text)") -> Scene:
     except SceneError as failure:
         raise SceneError(told(failure.mistakes, added, document)) from None
     if given is document.value:
-        scene._source_text, scene._file = text, file if file != "(text)" else ""
+        scene._source_text = text
+        scene._file = file if file != "(text)" else ""
     else:
         scene._about = f"{scene.name} with its robots as bodies"
         scene._remarks = tuple(added.remarks)

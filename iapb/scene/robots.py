@@ -78,12 +78,15 @@ class Added(NamedTuple):
 def with_robots(document: Document) -> tuple[Any, Added]:
     """Return the plain values of a scene with its robots turned into bodies, and what they
     add."""
-    given, added, file = document.value, Added([], [], []), document.file
+    given = document.value
+    added = Added([], [], [])
+    file = document.file
     if not (
         isinstance(given, dict) and "dimensions" in given and isinstance(given.get("robots"), list)
     ):
         return given, added
-    listed, robots = given.get("bodies", []), given["robots"]
+    listed = given.get("bodies", [])
+    robots = given["robots"]
     if len(robots) > MAX_ROBOTS:
         place = document.place(("robots",))
         said = f"{len(robots)} robots", f"at most {MAX_ROBOTS} robots"
@@ -113,7 +116,8 @@ def told(mistakes: Sequence[Mistake], added: Added, document: Document) -> list[
     """Return mistakes of a scene with robots: those of a robot's body name its link and joint, and
     a robot that is refused adds no second mistake, such as a hand without a body."""
     listed = document.value.get("bodies") if isinstance(document.value, dict) else None
-    first, found = len(listed) if isinstance(listed, list) else 0, []
+    first = len(listed) if isinstance(listed, list) else 0
+    found = []
     for mistake in mistakes:
         if added.mistakes and _FOLLOWS.match(f"{mistake.path} {mistake.expected}"):
             continue
@@ -146,7 +150,8 @@ def bodies_of(robot: Robot, folder: Path, added: Added, number: int) -> list[dic
     from iapb.mechanics.rotations import angles_of, rotation_of
     from iapb.mechanics.urdf import read_robot
 
-    path, root = Path(robot.urdf), folder.resolve()
+    path = Path(robot.urdf)
+    root = folder.resolve()
     leads_out = "\0" in robot.urdf or path.is_absolute() or ".." in path.parts
     if leads_out or not (root / path).resolve().is_relative_to(
         root
@@ -168,10 +173,8 @@ def bodies_of(robot: Robot, folder: Path, added: Added, number: int) -> list[dic
         rotation, origin = body.placement
         if body.parent is None:
             turn = rotation_of(robot.rpy)
-            rotation, origin = (
-                product(turn, rotation),
-                product(turn, origin) + np.array(robot.origin),
-            )
+            rotation = product(turn, rotation)
+            origin = product(turn, origin) + np.array(robot.origin)
         kind = KINDS[body.joint.kind]
         limits = ranges.get(body.name)
         start = _start(robot, link, limits)
@@ -210,7 +213,8 @@ def bodies_of(robot: Robot, folder: Path, added: Added, number: int) -> list[dic
 def _start(robot: Robot, link: Link, limits: Range | None) -> tuple[float, ...]:
     """Return the start of a link's joint: as given, else the neutral one or the nearest within the
     limits."""
-    neutral, given = KINDS[link.body.joint.kind].neutral, robot.position.get(link.name)
+    neutral = KINDS[link.body.joint.kind].neutral
+    given = robot.position.get(link.name)
     if link.body.mimic:
         return given or ()
     if limits is None or (given and len(given) != 1):

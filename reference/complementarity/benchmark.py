@@ -58,7 +58,9 @@ def run_solvers(
     """
     asymmetry = problem.asymmetry if problem.asymmetry > SYMMETRY_TOLERANCE else 0.0
     slow = {} if slow is None else slow
-    found, missing, left_out = list[Solution](), list[SolverRow](), list[SolverRow]()
+    found = list[Solution]()
+    missing = list[SolverRow]()
+    left_out = list[SolverRow]()
     for name in solvers or solver_names(problem):
         row = partial(SolverRow, problem.name, problem.size, name, asymmetry)
         if name in slow:
@@ -69,7 +71,8 @@ def run_solvers(
             found.append(solve(problem, name))
         except MissingDependencyError as error:
             missing.append(row("missing", str(error)))
-    best, rows = min(found, key=lambda s: s.residuals.worst, default=None), list[SolverRow]()
+    best = min(found, key=lambda s: s.residuals.worst, default=None)
+    rows = list[SolverRow]()
     for s in found:
         apart = (
             np.abs(s.gamma_plus - best.gamma_plus).max(initial=0.0)

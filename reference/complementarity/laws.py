@@ -34,7 +34,9 @@ LADDER = ("daqp", "quadprog", "lemke", "gauss_seidel")
 # squares ends near 1e-13 for a consistent problem and far above for an inconsistent one.
 EXPLAINED = 1e-9
 ROUNDING = 1e-12  # share of the largest impulse below which a negative one counts as rounding error
-NONE, ARTEFACT, ADHESIVE = "none", "artefact of the minimum norm", "adhesive"
+NONE = "none"
+ARTEFACT = "artefact of the minimum norm"
+ADHESIVE = "adhesive"
 
 
 @dataclass(frozen=True)
@@ -86,10 +88,13 @@ def newton_equality(problem: ImpactProblem) -> Outcome:
     SolverError
         Redundant rows with different e contradict each other, so no velocity satisfies all of them.
     """
-    mass, rows, target = _known(problem.mass_matrix), problem.factor, -problem.offset
+    mass = _known(problem.mass_matrix)
+    rows = problem.factor
+    target = -problem.offset
     if not len(rows):
         return Outcome(_known(problem.velocity), np.zeros(0))
-    cholesky, length = np.linalg.cholesky(mass), np.linalg.norm(rows, axis=1)
+    cholesky = np.linalg.cholesky(mass)
+    length = np.linalg.norm(rows, axis=1)
     unit = np.where(length > 0.0, length, 1.0)[:, None]
     # A = J L⁻ᵀ comes from a triangular solve with a relative error up to n ε κ(L). A smaller
     # singular value may be rounding error of dependent rows, and dividing by it would turn noise
@@ -133,10 +138,8 @@ def pulling_share(
     SolverError
         The least-squares iteration does not converge.
     """
-    rows, given = (
-        np.asarray(contact_jacobian, np.float64),
-        np.asarray(generalized_impulse, np.float64),
-    )
+    rows = np.asarray(contact_jacobian, np.float64)
+    given = np.asarray(generalized_impulse, np.float64)
     if rows.ndim != 2 or rows.shape[1:] != given.shape:
         raise ArgumentError(
             "contact_jacobian", rows.shape, f"{len(given)} columns, as generalized_impulse"
@@ -149,7 +152,8 @@ def unpushed_share(columns: np.ndarray, goal: np.ndarray) -> float:
     """Return the least |columns @ p − goal| / |goal| over all p >= 0; 0 if the goal is 0."""
     from scipy.optimize import nnls
 
-    size, length = float(np.linalg.norm(goal)), np.linalg.norm(columns, axis=0)
+    size = float(np.linalg.norm(goal))
+    length = np.linalg.norm(columns, axis=0)
     if size == 0.0 or len(length) == 0:
         return 0.0 if size == 0.0 else 1.0
     unit = np.where(length > 0.0, length, 1.0)
@@ -175,7 +179,8 @@ def _solved(problem: ImpactProblem, solver: str | None, speed: float = 0.0) -> t
     LAW_TOLERANCE."""
     # Relative to `speed` [m/s] if the problem's own velocities are smaller: after compression, only
     # rounding errors may be left, and opposed rows may contradict each other in them.
-    said, own = [], velocity_scale(problem)
+    said = []
+    own = velocity_scale(problem)
     for name in LADDER if solver is None else (solver,):
         solution = solve(problem, name)
         residual = solution.residuals.worst * own / max(speed, own)

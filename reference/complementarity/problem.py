@@ -146,7 +146,8 @@ class ImpactProblem:
                 f"refused: W is asymmetric (relative {self.asymmetry:.1e}), not convex"
             )
         eigenvalues, vectors = np.linalg.eigh(0.5 * (self.delassus + self.delassus.T))
-        least, largest = eigenvalues.min(initial=0.0), np.abs(eigenvalues).max(initial=0.0)
+        least = eigenvalues.min(initial=0.0)
+        largest = np.abs(eigenvalues).max(initial=0.0)
         if least < -INDEFINITE_TOLERANCE * largest:
             raise SolverError(
                 f"refused: W is indefinite (relative eigenvalue {least / largest:.1e}), not convex"

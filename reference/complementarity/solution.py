@@ -105,7 +105,9 @@ def residuals(problem: ImpactProblem, impulse: Floats) -> Residuals:
     `velocity_scale`)."""
     if problem.size == 0:
         return Residuals(0.0, 0.0, 0.0, 0.0)
-    mu, size, scale = problem.friction_or_zero, problem.contact_size, velocity_scale(problem)
+    mu = problem.friction_or_zero
+    size = problem.contact_size
+    scale = velocity_scale(problem)
     w = problem.contact_velocity(impulse).reshape(-1, size) / scale
     if problem.friction is not None and not problem.relaxed:
         w = de_saxce_shift(w, mu)
@@ -115,7 +117,8 @@ def residuals(problem: ImpactProblem, impulse: Floats) -> Residuals:
     natural = p - project_on_cone(p - w, mu)
     product = np.abs(np.einsum("ij,ij->i", p, w)) / np.maximum(1.0, np.linalg.norm(p, axis=1))
     # the distance from the dual cone is |proj_K(-w)| by Moreau's decomposition
-    outside, penetrating = p - project_on_cone(p, mu), project_on_cone(-w, mu)
+    outside = p - project_on_cone(p, mu)
+    penetrating = project_on_cone(-w, mu)
     return Residuals(
         float(np.linalg.norm(outside, axis=1).max()),
         float(np.linalg.norm(penetrating, axis=1).max()),
@@ -126,7 +129,8 @@ def residuals(problem: ImpactProblem, impulse: Floats) -> Residuals:
 
 def project_on_cone(blocks: Floats, friction: Floats) -> Floats:
     """Project each row of `blocks` (k, m) orthogonally on Coulomb's cone of `friction` (k,)."""
-    normal, tangent = blocks[:, 0], np.linalg.norm(blocks[:, 1:], axis=1)
+    normal = blocks[:, 0]
+    tangent = np.linalg.norm(blocks[:, 1:], axis=1)
     inside = (normal >= 0.0) & (tangent <= friction * normal)
     polar = ~inside & (friction * tangent <= -normal)
     height = np.where(polar, 0.0, (normal + friction * tangent) / (1.0 + friction**2))

@@ -55,7 +55,8 @@ def certify(
         raise ArgumentError(
             "RUN", ", ".join(map(str, files)), "run files, or folders that hold some"
         )
-    found, unread = dict[Path, Certificate](), dict[Path, str]()
+    found = dict[Path, Certificate]()
+    unread = dict[Path, str]()
     if export:
         found = _exported(paths, export)
     for path in [] if export else paths:
@@ -116,10 +117,8 @@ def _lines(found: dict[Path, Certificate], failed: list[Path]) -> Iterator[str]:
                 f"confirmed in exact "
                 f"integer arithmetic); decided in exact integer arithmetic: {one.by_integers}"
             )
-    impacts, gains = (
-        sum(one.impacts for one in found.values()),
-        sum(one.gains for one in found.values()),
-    )
+    impacts = sum(one.impacts for one in found.values())
+    gains = sum(one.gains for one in found.values())
     yield f"{counted(impacts, 'impact')} of {counted(len(found), 'file')}: {gains} gained energy (exact)."
     for path in failed[:1]:
         if found[path].counterexample:

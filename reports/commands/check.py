@@ -33,7 +33,8 @@ def check(
         cautions = (*cautions, Caution("size", source.name, said))
     elif said:
         remarks = (*remarks, f"{source.name} in {world}: {said}")
-    lines, limits = [f"{remark}." for remark in remarks], None
+    lines = [f"{remark}." for remark in remarks]
+    limits = None
     if source.contact.forces == "paper":  # implicit contact has no such limits
         limits = step_limits(Start(source))
     if limits is not None:

@@ -97,7 +97,8 @@ def compare(
                 impacts=impacts,
                 progress=progress,
             )
-            name, lines = found.details["scene"], _scene_lines(found)
+            name = found.details["scene"]
+            lines = _scene_lines(found)
         else:
             alone = Topic(
                 key="problems",
@@ -112,7 +113,8 @@ def compare(
                 "full" if full or only_problems else "quick",
                 partial(progress, topic.title),
             )
-            name, lines = topic.key, _problem_lines(found)
+            name = topic.key
+            lines = _problem_lines(found)
     place = out or FOLDER / f"{name}.json"
     new = [part for part in found.parts if part.sentence not in found.answer]
     lines += [sentence(part.sentence, "• ") for part in new]
@@ -154,7 +156,8 @@ def _facts(found: Finding) -> dict[str, Any]:
 def _scene_lines(found: Finding) -> list[str | Table]:
     """Return one page of text: distances, energy and time by world, then the results of the solvers
     on the impacts."""
-    table, against = found.tables["worlds"], found.details["against"]
+    table = found.tables["worlds"]
+    against = found.details["against"]
     far = titled(
         (
             "world",

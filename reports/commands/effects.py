@@ -47,7 +47,8 @@ def effects(
         if chosen
         else decide_effects(source)
     )
-    on, ignored = [effect for effect in found if effect.active], ignored_fields(found)
+    on = [effect for effect in found if effect.active]
+    ignored = ignored_fields(found)
     said = f" ({world} ignores {', '.join(ignored)})" if ignored else ""
     lines = [
         f"Effects of {source.name}{f' in {world}' if world else ''}: what is on, and what it prevents{said}"

@@ -46,7 +46,8 @@ def report(
     some differ."""
     if not math.isfinite(tolerance):
         raise ArgumentError("--tolerance", tolerance, "a finite number, 0 or more")
-    first, second = read_numbers(old), read_numbers(new)
+    first = read_numbers(old)
+    second = read_numbers(new)
     found = compare_reports(first, second, tolerance)
     reasons = unlike(first.provenance, second.provenance)
     facts = {

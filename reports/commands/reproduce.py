@@ -69,7 +69,8 @@ def reproduce(
         "latex2mathml",
     ):  # if one is missing, say it before minutes of computing
         needed(package, "iapb reproduce")
-    depth, folder = "full" if full else "quick", out or Path("out")
+    depth = "full" if full else "quick"
+    folder = out or Path("out")
     if check is not None:
         return check_report(check, out)
     if figure is not None:
@@ -86,7 +87,8 @@ def make_report(out: Path, depth: str) -> Answer:
     If nothing that the report is made from has changed since the last call, its answer is given
     again.
     """
-    started, key = time.perf_counter(), report_key(out, depth)
+    started = time.perf_counter()
+    key = report_key(out, depth)
     if (kept := kept_answer(out, key)) is not None:
         facts, lines = kept
         return Answer(facts, [*lines, "Nothing that it is made from has changed since."])
@@ -168,7 +170,8 @@ def check_report(report: Path, out: Path | None) -> Answer:
         if answer.status:
             return answer
         made = read_numbers(folder)
-    found, reasons = compare_reports(given, made), unlike(given.provenance, made.provenance)
+    found = compare_reports(given, made)
+    reasons = unlike(given.provenance, made.provenance)
     lost = found.count(ONLY_OLD) + len(found.tables_old)
     failed = found.count(DIFFERS) + lost + (0 if reasons else len(found.runs_other))
     like = (
@@ -261,7 +264,8 @@ def _inputs(
             raise ArgumentError("--set", recipe.key, f"a figure that shows scenes: {able}")
         evidence = gather(out, depth, progress)
         return figure_inputs(evidence), evidence.failed
-    runner, found = Runner(out / "runs"), dict[str, Any]()
+    runner = Runner(out / "runs")
+    found = dict[str, Any]()
     for done, name in enumerate(needs, 1):
         if name in FIGURE_RUNS:
             found[name] = figure_run(runner, name, values)

@@ -78,10 +78,12 @@ def run(
     Prints the warnings of iapb check first. Ends with status 3 if the result is not to be trusted.
     Ctrl-C keeps the steps done, in a file that ends in .partial.
     """
-    source, runner = scene_given(scene, set_), Runner(out)
+    source = scene_given(scene, set_)
+    runner = Runner(out)
     chosen = find_world(world, rendering)
     law = chosen.law
-    cautions, (said, _) = check_scene(source, law, chosen.coupling), cost_in_words(source, law)
+    cautions = check_scene(source, law, chosen.coupling)
+    (said, _) = cost_in_words(source, law)
     if said:
         to_stderr(f"{source.name} in {world}: {said}.")
     for caution in cautions:
@@ -150,11 +152,9 @@ def deepest(run: Run) -> float:
 
 def describe(run: Run, existed: bool) -> Iterator[str]:
     """Yield a summary of a run in sentences; the arrays may be in memory or in the run's file."""
-    seconds, impacts, ignored = (
-        float(np.sum(run.chunk_seconds)),
-        run.impacts,
-        ignored_fields(run.effects),
-    )
+    seconds = float(np.sum(run.chunk_seconds))
+    impacts = run.impacts
+    ignored = ignored_fields(run.effects)
     said = f"; ignores {', '.join(ignored)}" if ignored else ""
     yield f"{run.scene_name} in the world {run.world}: {run.law}, coupling {run.coupling}{said}."
     how = "read from its file; it had taken" if existed else "computed in"
@@ -176,7 +176,8 @@ def describe(run: Run, existed: bool) -> Iterator[str]:
         yield "No contact got an impulse."
     if len(run.contacts.gap):
         yield f"Deepest penetration {deepest(run) * 1e3:.4g} mm."
-    count, tool = len(run.coordinate_names), range(*run.tool_coordinates)
+    count = len(run.coordinate_names)
+    tool = range(*run.tool_coordinates)
     shown = range(count) if count <= SHOWN_COORDINATES else tool or range(SHOWN_COORDINATES)
     more = (
         f" (and {count - len(shown)} more coordinates in the run's file)"

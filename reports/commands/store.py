@@ -87,7 +87,8 @@ def _again(where: Path) -> Answer:
         if where.is_dir()
         else [where]
     )
-    facts, lines = dict[Path, dict[str, object]](), list[str]()
+    facts = dict[Path, dict[str, object]]()
+    lines = list[str]()
     with stage_progress() as progress:
         for done, path in enumerate(files):
             progress("runs simulated again", done, len(files))
@@ -102,7 +103,8 @@ def _again(where: Path) -> Answer:
                 f"{one_line(path)}: {'the same to the last bit' if found.same else 'differs in'}"
             )
             lines += [f"  {one.name}: {one.how}" for one in found.differs]
-            made, here = read_provenance(path).get("blas", "unknown"), linear_algebra()
+            made = read_provenance(path).get("blas", "unknown")
+            here = linear_algebra()
             if not found.same and made != here:
                 lines.append(f"  it was stored under {made}; this is {here}")
     same = sum(bool(one.get("same")) for one in facts.values())

@@ -51,7 +51,8 @@ class RunStore:
     """
 
     def __init__(self, folder: Path | str, code: str | None = None) -> None:
-        self.folder, self.code = Path(folder), code
+        self.folder = Path(folder)
+        self.code = code
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:

@@ -171,7 +171,9 @@ def data_checksum(file: Any, path: Path) -> str:
     """Return sha256 of all datasets, and of the attributes by which a run is read."""
     import h5py
 
-    digest, budget, names = hashlib.sha256(), Budget(path, file), list[str]()
+    digest = hashlib.sha256()
+    budget = Budget(path, file)
+    names = list[str]()
     file.visititems(
         lambda name, item: names.append(name) if isinstance(item, h5py.Dataset) else None
     )

@@ -132,10 +132,9 @@ def _write_run(file: Any, run: Run, key: str, provenance: Mapping[str, str] | No
             )
     for name in (*schema.GROUPS, "energy", "effects", "provenance"):
         file.create_group(name, track_order=name in ("energy", "provenance"))
-    groups, scales = (
-        {name: file[name] for name in file},
-        dict[tuple[str, str], Any](),
-    )  # a look-up takes 0.1 ms
+    # a look-up takes 0.1 ms
+    groups = {name: file[name] for name in file}
+    scales = dict[tuple[str, str], Any]()
     for group, quantity, values in _columns(run):
         for dimension, length in zip(quantity.dimensions, values.shape, strict=True):
             if (group, dimension) not in scales:
@@ -194,7 +193,8 @@ def opened_run(
     The file is checked completely, in constant memory. `changed`: see `io.opened`.
     """
     with io.opened(path, changed=changed) as file:
-        run, entry = _run_in(file, path, read, budget), _entry(file, path)
+        run = _run_in(file, path, read, budget)
+        entry = _entry(file, path)
         _check(run)
         if content_hash(run) != entry.content_hash:
             raise RunFileError(

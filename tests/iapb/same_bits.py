@@ -53,7 +53,8 @@ def _impacts() -> Any:
     size."""
     numbers = np.random.default_rng(13)
     for k in range(200):
-        d, c = 2 + k % 6, 1 + k % 8
+        d = 2 + k % 6
+        c = 1 + k % 8
         factor = numbers.integers(-8, 9, (d, d))
         J = numbers.integers(-8, 9, (c, d)) * 2.0 ** numbers.integers(-3, 4, (c, 1))
         yield (factor @ factor.T) / 16.0 + np.eye(d) / 4.0, J, numbers.integers(-64, 65, d) / 32.0

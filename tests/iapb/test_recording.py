@@ -40,7 +40,8 @@ def results_of(record, place="run"):
 
 
 def assert_same(first: Run, second: Run) -> None:
-    ours, theirs = results_of(first), results_of(second)
+    ours = results_of(first)
+    theirs = results_of(second)
     assert ours.keys() == theirs.keys()
     for name, values in ours.items():
         assert np.array_equal(values, theirs[name]), name

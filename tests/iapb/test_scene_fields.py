@@ -83,7 +83,8 @@ def test_the_record_has_the_force_of_each_steps_middle_and_steps_alone_give_the_
             "hand.force_function": ["0.1*sin(2*pi*t)", 0, "step(t - 0.5)/100"],
         }
     )
-    run, alone = simulate(scene, ImpulseAugmented()), Simulation(scene)
+    run = simulate(scene, ImpulseAugmented())
+    alone = Simulation(scene)
     expected = np.array(
         [*map(scene.hand.force_at, ((np.arange(run.steps) + 0.5) * run.dt).tolist())]
     )

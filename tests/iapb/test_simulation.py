@@ -63,8 +63,11 @@ def test_the_compiled_loop_records_what_each_step_from_python_does_bit_for_bit(
     scene, coupling, law
 ):
     chosen = coupling_of(scene, coupling)
-    run, stepped = simulate(scene, law, chosen, steps=STEPS), Simulation(scene, law, chosen)
-    state, port, impact = stepped.state, stepped.port, 0
+    run = simulate(scene, law, chosen, steps=STEPS)
+    stepped = Simulation(scene, law, chosen)
+    state = stepped.state
+    port = stepped.port
+    impact = 0
     for k in range(STEPS):
         result = stepped.step()
         for names, line in ((("q", "v", "device_q", "device_v"), k + 1), (FORCES, k)):
@@ -75,7 +78,8 @@ def test_the_compiled_loop_records_what_each_step_from_python_does_bit_for_bit(
                 assert np.array_equal(getattr(run, name)[line], made), (k, name)
         assert result.state == run.state[k]
         rows = slice(run.contacts.offsets[k], run.contacts.offsets[k + 1])
-        count, logged = state.contact_count[0], state.impacts.logged[0]
+        count = state.contact_count[0]
+        logged = state.impacts.logged[0]
         assert rows.stop - rows.start == count
         for each in CONTACTS:
             made = (
@@ -98,10 +102,8 @@ def test_the_compiled_loop_records_what_each_step_from_python_does_bit_for_bit(
 @pytest.mark.parametrize("coupling", COUPLINGS)
 def test_a_law_written_in_python_is_run_and_recorded_as_the_compiled_one(coupling):
     chosen = coupling_of(PEG, coupling)
-    ours, theirs = (
-        simulate(PEG, Wrapped(), chosen, steps=STEPS),
-        simulate(PEG, steps=STEPS, coupling=chosen),
-    )
+    ours = simulate(PEG, Wrapped(), chosen, steps=STEPS)
+    theirs = simulate(PEG, steps=STEPS, coupling=chosen)
     assert (ours.kernel, theirs.kernel) == ("python", "compiled")
     assert_same(ours, theirs)
 
@@ -132,7 +134,8 @@ def test_the_hand_force_stays_until_the_next_one():
     pushed = simulation.step([2.0, -4.0, 0.01]).v
     again = simulation.step().v
     spatial = simulation.step([0, 0, 0, 0, 0, -0.01]).v
-    dt, mass = simulation.system.dt, np.array([2.0, 2.0, 0.005])
+    dt = simulation.system.dt
+    mass = np.array([2.0, 2.0, 0.005])
     assert np.array_equal(rest, np.zeros(3))
     assert pushed == pytest.approx(dt * np.array([2.0, -4.0, 0.01]) / mass, rel=1e-12)
     assert again == pytest.approx(2.0 * pushed, rel=1e-12)
@@ -298,7 +301,8 @@ def test_what_follows_from_a_run_is_its_own_and_computed_when_it_is_asked_for() 
 
     alone = [followed(simulate(scene, steps=STEPS)) for scene in (PEG, heavy)]
     assert all(ours != theirs for ours, theirs in zip(*alone, strict=True))
-    early, late = simulate(PEG, steps=STEPS), simulate(PEG, steps=STEPS)
+    early = simulate(PEG, steps=STEPS)
+    late = simulate(PEG, steps=STEPS)
     assert not {"pose", "energy", "distrust", "scene_source"} & vars(late).keys()
     assert early.pose.tobytes() == alone[0][0] and early.pose is early.pose
     last = simulate(heavy, steps=STEPS)
@@ -317,7 +321,8 @@ def test_what_follows_from_a_run_is_its_own_and_computed_when_it_is_asked_for() 
 def test_simulations_share_nothing_that_changes() -> None:
     """Of one scene, and of two that differ in a value: what one writes no other sees, and what both
     read stays."""
-    alike, coupling = ARM.with_values({"contact.friction": 0.25}), coupling_of(ARM, "four-channel")
+    alike = ARM.with_values({"contact.friction": 0.25})
+    coupling = coupling_of(ARM, "four-channel")
     moving, *others = (Simulation(system_of(each), coupling=coupling) for each in (ARM, ARM, alike))
     constant = {id(array) for each in (moving, *others) for array in each.port.mechanism.arrays()}
     changing = {each: [*each.state.arrays(), *each.port.arrays()] for each in (moving, *others)}

@@ -24,10 +24,14 @@ STEPS = 350
 class Wrapped:
     """The engine's law as a law of the caller's own, known by its protocol alone."""
 
-    name, rendering = "wrapped", "full"
+    name = "wrapped"
+    rendering = "full"
 
     def __init__(self, change=lambda result: result, after=0):
-        self.law, self.change, self.after, self.calls = ImpulseAugmented(), change, after, 0
+        self.law = ImpulseAugmented()
+        self.change = change
+        self.after = after
+        self.calls = 0
 
     @property
     def settings(self):
@@ -116,10 +120,8 @@ def test_motion_that_leaves_the_range_of_numbers_stops_the_run_and_says_why():
 def test_an_unstable_device_stops_the_run_before_its_numbers_run_out():
     """Its own damping b makes it diverge, by b dt / m = 1e6 a step, while nothing couples it to the
     tool."""
-    loose, scene = (
-        FourChannel((0.0,) * 3, (0.0,) * 3),
-        PEG.with_values({"device.damping": [1e9, 0, 0]}),
-    )
+    loose = FourChannel((0.0,) * 3, (0.0,) * 3)
+    scene = PEG.with_values({"device.damping": [1e9, 0, 0]})
     run = simulate(scene, ImpulseAugmented(), loose, steps=STEPS)
     assert "the device's motion" in run.stopped
     assert_readable(run, run.steps)

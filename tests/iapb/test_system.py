@@ -18,8 +18,10 @@ ARM = load_scene(find_scene("arm_pushing"))
 @pytest.mark.parametrize("scene", [PEG, ARM], ids=lambda scene: scene.name)
 def test_the_device_is_the_hand_held_tree_alone(scene):
     system = System(scene)
-    device, q = system.device_mechanism(), system.make_state().q
-    tool, coordinates = slice(*system.tool_dofs), slice(*system.tool_coordinates)
+    device = system.device_mechanism()
+    q = system.make_state().q
+    tool = slice(*system.tool_dofs)
+    coordinates = slice(*system.tool_coordinates)
     assert device.nv == tool.stop - tool.start
     assert device.mass_matrix(q[coordinates]) == pytest.approx(
         system.mechanism.mass_matrix(q)[tool, tool], abs=1e-15

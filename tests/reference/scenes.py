@@ -17,7 +17,8 @@ def scene_of(
     **given: Any,
 ) -> Any:
     """Return a scene of free bodies of 1 kg at 1 kHz, by default; `floor`: its height."""
-    down, kind = [0.0, 0.0, -1.0] if space else [0.0, -1.0], "half_space" if space else "half_plane"
+    down = [0.0, 0.0, -1.0] if space else [0.0, -1.0]
+    kind = "half_space" if space else "half_plane"
     walls = (
         []
         if floor is None

@@ -59,7 +59,9 @@ def test_a_local_problem_is_read_as_its_file_says(tmp_path: Path) -> None:
     """W by compressed rows, q, one mu per contact, and the stored solution; one of zeros is a
     placeholder."""
     rows = np.random.default_rng(0).normal(size=(6, 4))
-    delassus, offset, impulse = rows @ rows.T, np.arange(6.0), np.linspace(0.1, 0.6, 6)
+    delassus = rows @ rows.T
+    offset = np.arange(6.0)
+    impulse = np.linspace(0.1, 0.6, 6)
     for name, stored in (
         ("solved.hdf5", impulse),
         ("placeholder.hdf5", np.zeros(6)),
@@ -123,12 +125,11 @@ def test_a_global_problem_is_condensed_whatever_its_number_of_coordinates(
 ) -> None:
     """A dense M of 12,000 coordinates would take 1.2 GB; its 12,000 entries give the same W, entry
     by entry."""
-    rng, contacts = np.random.default_rng(0), 8
-    mass, f, mu = (
-        rng.uniform(0.5, 2.0, coordinates),
-        rng.normal(size=coordinates),
-        np.full(contacts, 0.3),
-    )
+    rng = np.random.default_rng(0)
+    contacts = 8
+    mass = rng.uniform(0.5, 2.0, coordinates)
+    f = rng.normal(size=coordinates)
+    mu = np.full(contacts, 0.3)
     h = sparse.random(coordinates, 3 * contacts, 0.05, random_state=1, format="csc")
     with h5py.File(tmp_path / "large.hdf5", "w") as file:
         group = file.create_group("fclib_global")
@@ -140,14 +141,15 @@ def test_a_global_problem_is_condensed_whatever_its_number_of_coordinates(
                 ("nzmax", matrix.nnz),
             ):
                 group[f"{name}/{key}"] = np.array([value], np.int32)
-            group[f"{name}/i"], group[f"{name}/p"], group[f"{name}/x"] = (
-                matrix.indices,
-                matrix.indptr,
-                matrix.data,
-            )
-        group["vectors/f"], group["vectors/w"], group["vectors/mu"] = f, np.zeros(3 * contacts), mu
+            group[f"{name}/i"] = matrix.indices
+            group[f"{name}/p"] = matrix.indptr
+            group[f"{name}/x"] = matrix.data
+        group["vectors/f"] = f
+        group["vectors/w"] = np.zeros(3 * contacts)
+        group["vectors/mu"] = mu
         group["spacedim"] = np.array([3], np.int32)
-    problem, dense = read_problem(tmp_path / "large.hdf5").problem, h.toarray()
+    problem = read_problem(tmp_path / "large.hdf5").problem
+    dense = h.toarray()
     assert (problem.mass_matrix is None) == (coordinates > WITH_MECHANICS)
     assert problem.delassus == pytest.approx(
         dense.T @ (dense / mass[:, None]), rel=1e-12, abs=1e-14

@@ -34,7 +34,9 @@ def row_of_balls(masses: list[float], e: float) -> LinearSystem:
 
 
 def test_ball_bounces_at_the_times_of_the_textbook() -> None:
-    e, height, g = 0.8, 1.0, 9.81
+    e = 0.8
+    height = 1.0
+    g = 9.81
     exact = event_driven(ball(e), [height], [0.0], 2.0)
     fall = np.sqrt(2.0 * height / g)
     expected = fall * np.array([0.0, 1.0, 1.0 + 2.0 * e, 1.0 + 2.0 * e + 2.0 * e**2])
@@ -54,7 +56,8 @@ def test_accumulating_impacts_are_reported_not_crossed() -> None:
 def test_plastic_block_slides_into_the_corner_and_rests() -> None:
     """A block pushed right and down: floor, then wall, then still; each wall's impulse is the lost
     momentum."""
-    rows, start = [[0.0, 1.0], [-1.0, 0.0]], [0.0, 1.0]
+    rows = [[0.0, 1.0], [-1.0, 0.0]]
+    start = [0.0, 1.0]
     system = LinearSystem(2.0 * np.eye(2), [1.0, -4.0], rows, start, 0.0)
     exact = event_driven(system, [0.0, 0.25], [0.0, 0.0], 5.0)
     assert exact.event_time == pytest.approx([0.0, 0.5, 2.0], rel=1e-14)
@@ -128,10 +131,12 @@ def test_an_arm_strikes_its_one_contact_with_the_speed_that_its_energy_says(
     closed."""
     scene = scene_of(ARM, gravity=G, floor=-0.25, contact={"restitution": restitution})
     truth = scene_truth(scene, 0.3)
-    inertia, angle = 0.03 + 2.0 * 0.2**2, np.arcsin(0.5)
+    inertia = 0.03 + 2.0 * 0.2**2
+    angle = np.arcsin(0.5)
     speed = np.sqrt(2.0 * 2.0 * G * 0.2 * np.sin(angle) / inertia)
     struck = truth.events[0]
-    before, after = truth.segments[0][2](struck), truth.segments[1][2](struck)
+    before = truth.segments[0][2](struck)
+    after = truth.segments[1][2](struck)
     assert before == pytest.approx([angle, speed], rel=1e-9)
     assert after == pytest.approx([angle, -restitution * speed], rel=1e-9, abs=1e-9)
     if restitution == 0.0:
@@ -230,7 +235,8 @@ def test_a_device_like_its_tool_goes_with_it_where_velocities_make_forces() -> N
 
 @pytest.mark.parametrize("world", ["IAPB", "ideal"])
 def test_damped_and_limited_joints_converge_to_the_event_driven_truth(world: str) -> None:
-    truth, errors = scene_truth(limited_arm(), 0.6), []
+    truth = scene_truth(limited_arm(), 0.6)
+    errors = []
     assert len(truth.events) >= 2  # both joints meet a limit
     for rate in (1000.0, 4000.0):
         stiffness = {"contact.forces": "paper", "contact.stiffness": 5e4 * rate / 1000.0}
@@ -254,7 +260,8 @@ def test_a_blow_comes_before_damping_and_gains_nothing(damping: float) -> None:
     run = run_world(
         scene_of(slider, space=False, duration=0.005, contact={"restitution": 1}), "ideal"
     )
-    (step,), impacts = run.impacts.step, run.impacts
+    (step,) = run.impacts.step
+    impacts = run.impacts
     slows = (1.0 - 5e-4 * damping) / (1.0 + 5e-4 * damping)
     came = 1000.0 * slows**step
     assert impacts.v_minus[0] == run.v[step] == pytest.approx([came], rel=1e-12)
@@ -269,7 +276,8 @@ def test_every_world_takes_the_hands_force_over_time() -> None:
     scene = load_scene(find_scene("peg_corner")).with_values(
         {"duration": 0.2, "hand.force": [0, 0, 0], "hand.force_table": table}
     )
-    engine, rigid = simulate(scene), run_world(scene, "ideal")
+    engine = simulate(scene)
+    rigid = run_world(scene, "ideal")
     assert np.array_equal(simulate(scene, world="IAPB").hand_force, rigid.hand_force)
     assert rigid.hand_force[-1, 0] == pytest.approx(
         0.2 * (len(rigid.time) - 1.5) * scene.step / 0.2

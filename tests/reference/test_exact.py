@@ -35,11 +35,10 @@ def test_exact_outcome_obeys_the_theorem_without_any_tolerance(seed: int) -> Non
     """J v⁺ = −e J v⁻ on every row, redundant ones included, and elastic energy is conserved,
     exactly."""
     rng = np.random.default_rng(seed)
-    root, rows = (
-        rng.integers(-4, 5, (4, 4)).astype(float),
-        rng.integers(-3, 4, (6, 4)).astype(float),
-    )
-    rows[3:], v = 2.0 * rows[:3], rng.normal(size=4)
+    root = rng.integers(-4, 5, (4, 4)).astype(float)
+    rows = rng.integers(-3, 4, (6, 4)).astype(float)
+    rows[3:] = 2.0 * rows[:3]
+    v = rng.normal(size=4)
     impact = exact_impact(root @ root.T + np.eye(4), rows, v, 1)
     assert impact.energy_after == impact.energy_before
     for row in rows:

@@ -74,7 +74,8 @@ def test_an_asymmetric_top_turns_as_elliptic_functions_say(
         scene_of({"inertia": moments.tolist(), "velocity": [0, 0, 0, *start]}), duration
     )
     assert v[:, 3:] == pytest.approx(body.rates(time), abs=1e-9 * spin)
-    axes, momentum = axes_of(q[:, 3:]), moments * start / body.momentum
+    axes = axes_of(q[:, 3:])
+    momentum = moments * start / body.momentum
     assert axes @ (moments * v[:, 3:])[:, :, None] / body.momentum == pytest.approx(
         np.broadcast_to(momentum[:, None], (len(time), 3, 1)), abs=1e-9
     )
@@ -110,7 +111,8 @@ def test_floating_trees_that_turn_keep_momentum_and_energy() -> None:
         )
         q = mechanics.normalize(np.ones(mechanics.nq))
         v = rng.uniform(-30.0, 30.0, mechanics.nv)
-        energy, momentum = mechanics.kinetic_energy(q, v), mechanics.centroidal_momentum(q, v)
+        energy = mechanics.kinetic_energy(q, v)
+        momentum = mechanics.centroidal_momentum(q, v)
         for _ in range(300):
             q, v = free_motion(mechanics, q, v, 1e-3)
         assert mechanics.kinetic_energy(q, v) == pytest.approx(energy, rel=1e-10)
@@ -121,13 +123,12 @@ def test_floating_trees_that_turn_keep_momentum_and_energy() -> None:
 
 # --- with gravity and contact
 # -------------------------------------------------------------------------------------
-A, C, ARM, TILT, PRECESSION = (
-    2e-3,
-    1e-3,
-    0.05,
-    0.4,
-    3.0,
-)  # kg m² about the centre of mass, m, rad, rad/s
+# kg m² about the centre of mass, m, rad, rad/s
+A = 2e-3
+C = 1e-3
+ARM = 0.05
+TILT = 0.4
+PRECESSION = 3.0
 
 
 @both
@@ -207,7 +208,11 @@ def test_an_eccentric_disc_that_turns_fast_stays_on_the_floor(spin: float) -> No
     Gravity holds it down against c θ'². The truth keeps the contact by an acceleration, J̇v, found
     by differences.
     """
-    mass, inertia, radius, arm, gravity = 1.0, 2e-3, 0.05, 0.01, 0.024 * spin**2
+    mass = 1.0
+    inertia = 2e-3
+    radius = 0.05
+    arm = 0.01
+    gravity = 0.024 * spin**2
     disc = {
         "inertia": inertia,
         "position": [0, radius, 0],
@@ -216,7 +221,8 @@ def test_an_eccentric_disc_that_turns_fast_stays_on_the_floor(spin: float) -> No
     }
     scene = scene_of(disc, space=False, gravity=gravity, floor=0.0, contact={"restitution": 0.0})
     _, q, v = by_events(scene, 10.0 / spin)
-    angle, rate = q[:, 2], v[:, 2]
+    angle = q[:, 2]
+    rate = v[:, 2]
     assert q[:, 1] == pytest.approx(radius - arm * np.sin(angle), abs=1e-10)
     energy = 0.5 * (
         inertia + mass * arm**2 * np.cos(angle) ** 2

@@ -82,7 +82,10 @@ def test_a_ball_bounces_with_the_share_of_its_speed(restitution: float) -> None:
 def test_the_damping_ratio_gives_the_restitution(restitution: float) -> None:
     ratio = damping_ratio_of(restitution)
     assert spring_restitution(ratio) == pytest.approx(restitution, rel=1e-9)
-    position, velocity, step = 0.0, 1.0, 1e-5  # x'' = −x − 2 ζ x', while it pushes
+    # x'' = −x − 2 ζ x', while it pushes
+    position = 0.0
+    velocity = 1.0
+    step = 1e-5
     while position >= 0.0 and position + 2.0 * ratio * velocity > 0.0:
         velocity -= step * (position + 2.0 * ratio * velocity)
         position += step * velocity
@@ -94,7 +97,8 @@ def test_free_bodies_and_joints_move_as_in_our_worlds() -> None:
     ours."""
     case = CASES["floating_robot"]
     scene = scene_from_values(case.scene).with_values({"duration": 0.2})
-    theirs, ours = simulate(scene, world="mujoco"), simulate(scene)
+    theirs = simulate(scene, world="mujoco")
+    ours = simulate(scene)
     assert np.abs(theirs.q - ours.q).max() < 5e-3
     assert np.abs(theirs.v - ours.v).max() < 2e-2 * np.abs(ours.v).max()
 

@@ -29,11 +29,13 @@ from reference.worlds import WORLDS, find_world, require_complete, run_world
 from tests.reference.scenes import scene_of
 
 DT = 1.0 / 512
-BAR, ENDS = np.diag([1.0, 1.0 / 12.0]), np.array([[1.0, 0.5], [1.0, -0.5]])
+BAR = np.diag([1.0, 1.0 / 12.0])
+ENDS = np.array([[1.0, 0.5], [1.0, -0.5]])
 
 
 def step(mass, v, f, rows, gap, e, **options):  # type: ignore[no-untyped-def]
-    rows, v = np.atleast_2d(np.asarray(rows, float)), np.asarray(v, float)
+    rows = np.atleast_2d(np.asarray(rows, float))
+    v = np.asarray(v, float)
     return rigid_step(
         np.asarray(mass, float),
         v,
@@ -71,9 +73,11 @@ def test_every_step_satisfies_its_conditions(seed: int) -> None:
     """Feasible, non-adhesive, complementary, dynamics kept; a plastic closed step without load
     never gains energy."""
     rng = np.random.default_rng(seed)
-    d, c = int(rng.integers(1, 7)), int(rng.integers(1, 9))
+    d = int(rng.integers(1, 7))
+    c = int(rng.integers(1, 9))
     root = rng.normal(size=(d, d))
-    mass, v = root @ root.T + 0.1 * np.eye(d), rng.normal(size=d)
+    mass = root @ root.T + 0.1 * np.eye(d)
+    v = rng.normal(size=d)
     rows = rng.normal(size=(c, d)) @ np.diag(rng.integers(0, 2, size=d))
     gap = rng.choice([-1e-3, 0.0, 1e-4], size=c)
     result = step(mass, v, np.zeros(d), rows, gap, 0.0)
@@ -113,7 +117,8 @@ def test_a_resting_contact_under_load_does_not_hop() -> None:
 
 
 def test_an_open_contact_may_not_pass_where_its_own_restitution_is_zero() -> None:
-    gap, v = np.array([1e-4, 1e-4]), np.array([-1.0, -1.0])
+    gap = np.array([1e-4, 1e-4])
+    v = np.array([-1.0, -1.0])
     found = rigid_step(np.eye(2), v, np.zeros(2), DT, np.eye(2), gap, v, np.array([0.0, 0.5]))
     assert (
         gap[0] + DT * found.velocity[0] == pytest.approx(0.0, abs=1e-18)
@@ -136,7 +141,8 @@ def test_a_wrong_multiplier_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_velocities_that_cancel_are_judged_by_their_rounding() -> None:
     """A gram under a tonne, at rest: 5e3 m/s from above and from below leave 1e-12 m/s, not a wrong
     active set."""
-    mass, load = np.diag([1e-3, 1e3]), np.array([-9.81e-3, -9.81e3])
+    mass = np.diag([1e-3, 1e3])
+    load = np.array([-9.81e-3, -9.81e3])
     result = step(mass, [0.0, 0.0], load, [[1.0, 0.0], [-1.0, 1.0]], [0.0, 0.0], 0.0)
     assert np.abs(result.velocity).max() <= 1e-11
     assert result.impulse == pytest.approx([9.81e3 * DT, 9.81e3 * DT], rel=1e-5)
@@ -187,9 +193,13 @@ def test_a_load_at_rest_is_not_thrown_by_rounding() -> None:
 @given(seed=st.integers(0, 10_000))
 def test_steps_never_gain(equal: float | None, seed: int) -> None:
     rng = np.random.default_rng(seed)
-    d, c = int(rng.integers(1, 7)), int(rng.integers(2, 7))
-    root, rows, v = rng.normal(size=(d, d)), rng.normal(size=(c, d)), rng.normal(size=d)
-    mass, e = root @ root.T + 0.1 * np.eye(d), rng.choice([0.0, 0.3, 1.0], size=c)
+    d = int(rng.integers(1, 7))
+    c = int(rng.integers(2, 7))
+    root = rng.normal(size=(d, d))
+    rows = rng.normal(size=(c, d))
+    v = rng.normal(size=d)
+    mass = root @ root.T + 0.1 * np.eye(d)
+    e = rng.choice([0.0, 0.3, 1.0], size=c)
     found = step(mass, v, np.zeros(d), rows, np.zeros(c), e if equal is None else equal)
     assert found.velocity @ mass @ found.velocity <= (1.0 + 1e-9) * (v @ mass @ v)
     assert (rows @ found.velocity).min() >= -1e-8 * np.abs(rows).max() * np.abs(v).max() * d
@@ -197,7 +207,8 @@ def test_steps_never_gain(equal: float | None, seed: int) -> None:
 
 def linkage() -> Mechanism:
     """Two links in a chain and a free peg."""
-    inertia, elbow = np.diag([0.1, 0.1, 0.1]), (np.eye(3), np.array([1.0, 0.0, 0.0]))
+    inertia = np.diag([0.1, 0.1, 0.1])
+    elbow = (np.eye(3), np.array([1.0, 0.0, 0.0]))
     return Mechanism(
         [
             Body("upper", None, Joint("revolute"), mass=1.0, inertia=inertia),
@@ -220,7 +231,8 @@ def rows_of(
 
 def test_a_straight_arm_struck_along_itself_has_no_row() -> None:
     """Rounding leaves 1e-16 of a lever arm; as a row of its own it would take half the energy."""
-    q, axis = np.array([0.7, 0.0, 0.0, 0.0, 0.0]), np.array([[np.cos(0.7), np.sin(0.7), 0.0]])
+    q = np.array([0.7, 0.0, 0.0, 0.0, 0.0])
+    axis = np.array([[np.cos(0.7), np.sin(0.7), 0.0]])
     assert not rows_of(q, [(1, -1)], 1.7 * axis, -axis).any()
 
 
@@ -235,7 +247,8 @@ def test_a_box_slides_straight_in_space_and_stops_where_the_textbook_says(fricti
     }
     scene = scene_of(plate, gravity=9.81, floor=0.0, contact={"restitution": 0, "friction": 0.6})
     run = simulate(scene, RigidConstraints(friction=friction), steps=110)
-    expected, near = 0.5**2 / (2.0 * 0.6 * 9.81), {"coulomb": 1e-3, "relaxed": 2e-3}[friction]
+    expected = 0.5**2 / (2.0 * 0.6 * 9.81)
+    near = {"coulomb": 1e-3, "relaxed": 2e-3}[friction]
     assert run.complete and run.q[-1, :2] == pytest.approx(
         expected * np.array([0.6, 0.8]), abs=near
     )
@@ -254,7 +267,8 @@ def test_friction_never_leaves_its_cone_and_leaves_no_contact_closing(size: int)
     rng = np.random.default_rng(size)
     for _ in range(20):
         rows = rng.normal(size=(6, size, 5))
-        bound, v_free = rng.normal(size=6) * 0.1 - 0.3, rng.normal(size=5)
+        bound = rng.normal(size=6) * 0.1 - 0.3
+        v_free = rng.normal(size=5)
         v, normal, tangential = friction_step(
             np.eye(5), v_free, rows[:, 0], rows[:, 1:], bound, 0.4
         )
@@ -266,7 +280,9 @@ def test_friction_never_leaves_its_cone_and_leaves_no_contact_closing(size: int)
 
 def test_contacts_without_a_common_body_are_solved_apart() -> None:
     rng = np.random.default_rng(5)
-    parts, v_free, rows = rng.normal(size=(2, 3, 3, 6)), rng.normal(size=12), np.zeros((6, 3, 12))
+    parts = rng.normal(size=(2, 3, 3, 6))
+    v_free = rng.normal(size=12)
+    rows = np.zeros((6, 3, 12))
     rows[::2, :, :6], rows[1::2, :, 6:] = parts
     v, normal, _ = friction_step(np.eye(12), v_free, rows[:, 0], rows[:, 1:], np.zeros(6), 0.3)
     for part, at in zip(parts, (slice(0, 6), slice(6, 12)), strict=True):
@@ -279,20 +295,21 @@ def test_contacts_without_a_common_body_are_solved_apart() -> None:
 
 def test_the_parts_of_a_step_add_up_to_the_change_of_momentum_and_the_peg_comes_to_rest() -> None:
     system = System(load_scene(find_scene("peg_corner")))
-    state, force, dt, law = (
-        system.make_state(),
-        np.array([-3.2, 4.0, 0.0]),
-        1.0 / 512,
-        RigidConstraints(),
-    )
-    mass, deepest, states = mechanics_of(system).mass_matrix(state.q), 0.0, set()
+    state = system.make_state()
+    force = np.array([-3.2, 4.0, 0.0])
+    dt = 1.0 / 512
+    law = RigidConstraints()
+    mass = mechanics_of(system).mass_matrix(state.q)
+    deepest = 0.0
+    states = set()
     for _ in range(1500):
         before = state.v.copy()
         result = law.advance(system, state, force, dt)
         change = dt * (force + result.penalty_force + result.friction_force) + result.impulse
         assert np.abs(mass @ (result.v - before) - change).max() <= 1e-12
         assert (result.state == COLLIDING) == bool(state.impacts.logged[0])
-        state.q[:], state.v[:] = result.q, result.v
+        state.q[:] = result.q
+        state.v[:] = result.v
         states.add(result.state)
         deepest = min(deepest, state.contacts.gap[: state.contact_count[0]].min(initial=0.0))
     assert (
@@ -362,8 +379,10 @@ def row(count: int, space: bool, shape: dict[str, Any]) -> Scene:
     return scene_of(*bodies, space=space, floor=0.0, duration=0.003)
 
 
-CIRCLE, BALL_ = {"kind": "circle", "radius": 0.05}, {"kind": "sphere", "radius": 0.05}
-SQUARE, CUBE = {"kind": "box", "size": [0.1, 0.1]}, {"kind": "box", "size": [0.1, 0.1, 0.1]}
+CIRCLE = {"kind": "circle", "radius": 0.05}
+BALL_ = {"kind": "sphere", "radius": 0.05}
+SQUARE = {"kind": "box", "size": [0.1, 0.1]}
+CUBE = {"kind": "box", "size": [0.1, 0.1, 0.1]}
 
 
 @pytest.mark.parametrize(
@@ -374,7 +393,8 @@ def test_the_contacts_are_those_of_a_step_or_at_most_twice_as_many(
     space: bool, shape: Any, most: float
 ) -> None:
     system = System(row(8, space, shape))
-    state, cost = system.make_state(), RigidConstraints().cost(system)
+    state = system.make_state()
+    cost = RigidConstraints().cost(system)
     given = len(find_rows(system, state.q, state.v, np.inf).gap)
     assert given <= cost.contacts * 1.3 and cost.contacts <= most * given * 1.2
     assert cost.coordinates == system.mechanism.nv and cost.seconds > 0.0 and not cost.too_large
@@ -400,7 +420,8 @@ def test_a_world_is_a_law_and_a_coupling_with_the_scenes_gains(name: str) -> Non
     assert coupling.name == ("unilateral" if name == "CBuc" else "four-channel")
     gains = getattr(PEG.couplings, coupling.name.replace("-", "_"))
     assert coupling.settings == {"stiffness": list(gains.stiffness), "damping": list(gains.damping)}
-    run, parts = run_world(PEG, name, steps=60), simulate(PEG, world.law, coupling, steps=60)
+    run = run_world(PEG, name, steps=60)
+    parts = simulate(PEG, world.law, coupling, steps=60)
     assert run.world == name and run.complete
     assert np.array_equal(run.q, parts.q) and np.array_equal(run.device_q, parts.device_q)
     assert world.coupling_in(load_scene(find_scene("two_discs"))).name == "none"

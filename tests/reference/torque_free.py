@@ -51,7 +51,8 @@ class TorqueFreeBody:
     def speed_and_parameter(self) -> tuple[float, float]:
         """s [rad/s] and m of the elliptic functions."""
         i1, i2, i3 = self.moments
-        twice, square = 2.0 * self.energy, self.momentum**2
+        twice = 2.0 * self.energy
+        square = self.momentum**2
         speed = sqrt((i3 - i2) * (square - twice * i1) / (i1 * i2 * i3))
         return speed, (i2 - i1) * (twice * i3 - square) / ((i3 - i2) * (square - twice * i1))
 
@@ -76,13 +77,15 @@ class TorqueFreeBody:
         z.
         """
         angle = self._turned(time)
-        c, s = np.cos(angle), np.sin(angle)
+        c = np.cos(angle)
+        s = np.sin(angle)
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         return turn @ _frame(np.array(self.moments) * self.rates(time) / self.momentum)
 
     def _turned(self, time: float) -> float:
         """psi(t): the integral of L (2 E - I3 w3^2) / (L^2 - I3^2 w3^2)."""
-        i3, momentum = self.moments[2], self.momentum
+        i3 = self.moments[2]
+        momentum = self.momentum
         nodes, weights = np.polynomial.legendre.leggauss(_NODES)
         pieces = max(1, int(np.ceil(abs(time) / (0.25 * self.period))))
         edges = np.linspace(0.0, time, pieces + 1)

@@ -47,7 +47,8 @@ def put(folder, number=0):
 def result_files():
     """A short run, and a table."""
     with tempfile.TemporaryDirectory() as folder:
-        run, table = put(Path(folder)), Path(folder) / "table.h5"
+        run = put(Path(folder))
+        table = Path(folder) / "table.h5"
         write_record(table, [[0.5, "a"], [1.5, "b"]], {})
         return {"run.h5": run.read_bytes(), "table.h5": table.read_bytes()}
 
@@ -64,10 +65,9 @@ def fclib_files():
             group = file.create_group("fclib_global")
             matrix_group(group.create_group("M"), np.eye(6))
             matrix_group(group.create_group("H"), rng.normal(size=(6, 3)))
-            group["vectors/f"], group["vectors/w"], group["vectors/mu"] = (
-                np.ones(6),
-                np.zeros(3),
-                np.array([0.3]),
-            )
-            group["spacedim"], group["info/title"] = np.array([3], np.int32), np.bytes_("sample")
+            group["vectors/f"] = np.ones(6)
+            group["vectors/w"] = np.zeros(3)
+            group["vectors/mu"] = np.array([0.3])
+            group["spacedim"] = np.array([3], np.int32)
+            group["info/title"] = np.bytes_("sample")
         return {each.name: each.read_bytes() for each in sorted(path.parent.iterdir())}

@@ -110,14 +110,17 @@ def test_runs_do_not_depend_on_what_was_in_memory_before():
 class Overcounting:
     """A law whose step is the engine's, and which then claims that many contacts or impacts."""
 
-    name, settings = "overcounting", {}
+    name = "overcounting"
+    settings = {}
 
     def __init__(self, contacts=0, impacts=0):
-        self.contacts, self.impacts = contacts, impacts
+        self.contacts = contacts
+        self.impacts = impacts
 
     def advance(self, system, state, applied_force, dt):
         made = Penalty().advance(system, state, applied_force, dt)
-        state.contact_count[0], state.impacts.logged[0] = self.contacts, self.impacts
+        state.contact_count[0] = self.contacts
+        state.impacts.logged[0] = self.impacts
         return made
 
 

@@ -72,7 +72,8 @@ def write_for_ever(folder):
 
 def full_disk(folder, rng):
     """Store one run, then one under a limit of bytes that it exceeds at a random place."""
-    limit, said = int(rng.uniform(0.0, 0.99) * put(folder).stat().st_size), folder / "said"
+    limit = int(rng.uniform(0.0, 0.99) * put(folder).stat().st_size)
+    said = folder / "said"
 
     def write_with_limit():
         signal.signal(
@@ -158,9 +159,11 @@ def test_a_killed_command_loses_nothing_finished_and_runs_again(name, tmp_path):
     began = time.monotonic()
     child = done(tmp_path / "undisturbed")
     child.join()
-    lasted, undisturbed = time.monotonic() - began, hashes(tmp_path / "undisturbed")
+    lasted = time.monotonic() - began
+    undisturbed = hashes(tmp_path / "undisturbed")
     assert child.exitcode == 0 and undisturbed
-    rng, finished = np.random.default_rng(0), {}
+    rng = np.random.default_rng(0)
+    finished = {}
     for _ in range(2 + TIMES // 20):
         child = done(tmp_path / "killed")
         child.join(float(rng.uniform(0.1, lasted)))

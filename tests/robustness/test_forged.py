@@ -57,9 +57,11 @@ def apart(*words, act=command):
             try:
                 status = act(*words)
             except IapbError as error:
-                status, _ = 1, said.write(str(error))
+                status = 1
+                _ = said.write(str(error))
             except BaseException as error:
-                status, _ = -1, said.write(f"Traceback {error!r}")
+                status = -1
+                _ = said.write(f"Traceback {error!r}")
         grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) << 10
         pipe.send(
             (status, said.getvalue() if grown < MOST else f"Traceback: took {grown >> 20} MB")
@@ -99,7 +101,8 @@ def private(file):
     path = Path(file.filename).parents[1] / "private.h5"
     path.with_suffix(".txt").write_bytes(SECRET)
     with h5py.File(path, "w") as other:
-        other["secret"], other["numbers"] = SECRET.decode(), np.arange(3.0)
+        other["secret"] = SECRET.decode()
+        other["numbers"] = np.arange(3.0)
     return str(path)
 
 
@@ -180,7 +183,8 @@ ATTACKS = {  # by name: the attack, and what the refusal says
 
 @pytest.mark.parametrize("name", ATTACKS)
 def test_a_forged_run_is_refused_by_every_reader_and_shows_no_other_file(name, tmp_path):
-    store, (attack, told) = tmp_path / "store", ATTACKS[name]
+    store = tmp_path / "store"
+    (attack, told) = ATTACKS[name]
     store.mkdir()
     path = forged(store / "forged.h5", attack)
     write_run(store / "whole.h5", sample_run())
@@ -355,7 +359,8 @@ def limited(act, *words):
 
 
 def test_what_cannot_be_written_is_named_and_leaves_nothing_behind(tmp_path):
-    run, place = write_run(tmp_path / "run.h5", sample_run()), tmp_path / "new" / "file"
+    run = write_run(tmp_path / "run.h5", sample_run())
+    place = tmp_path / "new" / "file"
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(RunFileError, match="pipe: cannot be written: .* in its place"):
         write_whole(tmp_path / "pipe", "text")

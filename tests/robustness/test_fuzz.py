@@ -40,7 +40,9 @@ from tests.robustness.samples import TIMES, fclib_files, result_files
 
 pytestmark = pytest.mark.thorough
 
-READ, REFUSED, BROKEN = "read", "refused", "broken"
+READ = "read"
+REFUSED = "refused"
+BROKEN = "broken"
 # [s] of this process's own time; a case takes milliseconds, the largest legal file a few seconds
 LONGEST = 20.0
 MEMORY = 4 << 30  # bytes beyond what the process has: a wrong file may not ask for more
@@ -178,8 +180,11 @@ def chosen(rng, values):
 def damaged_bytes(content, other, rng):
     """Return the bytes with some flipped, lost, repeated, replaced or cut off."""
     for _ in changes(rng):
-        at, length = int(rng.integers(len(content) + 1)), int(2 ** rng.uniform(0, 8))
-        before, piece, after = content[:at], content[at : at + length], content[at + length :]
+        at = int(rng.integers(len(content) + 1))
+        length = int(2 ** rng.uniform(0, 8))
+        before = content[:at]
+        piece = content[at : at + length]
+        after = content[at + length :]
         flipped = (
             bytes([content[at] ^ (1 << int(rng.integers(8)))]) + content[at + 1 :]
             if at < len(content)
@@ -206,9 +211,11 @@ def damaged_text(sample, other, rng):
     packed = b"\x1f\x8b"  # the first bytes of what is compressed
     if sample.startswith(packed) or rng.random() < 0.1:
         return damaged_bytes(sample, other, rng)
-    text, other = sample.decode(), "" if other.startswith(packed) else other.decode()
+    text = sample.decode()
+    other = "" if other.startswith(packed) else other.decode()
     for _ in changes(rng):
-        at, lines = int(rng.integers(len(text) + 1)), text.split("\n")
+        at = int(rng.integers(len(text) + 1))
+        lines = text.split("\n")
         line, to = (int(rng.integers(len(lines))) for _ in range(2))
         words = lines[line].split(" ")
         words[int(rng.integers(len(words)))] = token = str(chosen(rng, TOKENS))
@@ -244,8 +251,11 @@ def damaged_values(sample, other, rng):
         places = list(places_of(plain))
         if not places:
             break
-        (owner, key), (other, where) = chosen(rng, places), chosen(rng, places)
-        value, taken, kind = owner[key], copy.deepcopy(other[where]), int(rng.integers(7))
+        (owner, key) = chosen(rng, places)
+        (other, where) = chosen(rng, places)
+        value = owner[key]
+        taken = copy.deepcopy(other[where])
+        kind = int(rng.integers(7))
         if kind == 0:
             del owner[key]
         elif kind == 1 and isinstance(owner, list):
@@ -280,11 +290,14 @@ def places_of(value):
 
 def damaged_hdf5(content, other, rng):
     """Damage to what the file says: parts lost, renamed, of another shape or type."""
-    stream, names = io.BytesIO(content), []
+    stream = io.BytesIO(content)
+    names = []
     with h5py.File(stream, "r+") as file:
         file.visit(names.append)
         for _ in changes(rng):
-            name, wrong, kind = chosen(rng, names), chosen(rng, WRONG), int(rng.integers(5))
+            name = chosen(rng, names)
+            wrong = chosen(rng, WRONG)
+            kind = int(rng.integers(5))
             if name not in file:
                 continue
             owner = chosen(rng, [file, file[name]])
@@ -402,14 +415,16 @@ def run_line(path):
         place.mkdir(exist_ok=True)
         for name, content in result_files().items():
             (place / name).write_bytes(content)
-    out, error = io.StringIO(), io.StringIO()
+    out = io.StringIO()
+    error = io.StringIO()
     with (
         contextlib.chdir(path.parent),
         contextlib.redirect_stdout(out),
         contextlib.redirect_stderr(error),
     ):
         status = main(words)
-    said, complained = out.getvalue().strip(), error.getvalue().strip()
+    said = out.getvalue().strip()
+    complained = error.getvalue().strip()
     assert (
         status in (0, 1, 2) and "Traceback" not in complained and (not status or said or complained)
     ), (words, status)
@@ -481,7 +496,8 @@ def bounded_memory():
 def test_wrong_input_is_read_or_refused_and_valid_input_is_read(kind, tmp_path):
     given_samples, damage, read, cases = KINDS[kind]
     shutil.copytree(scene_folder() / "robots", tmp_path / "robots")  # cases may refer to them
-    samples, outcomes = given_samples(), Counter()
+    samples = given_samples()
+    outcomes = Counter()
     for name, content in samples.items():
         outcome, words = judge(read, tmp_path / name, content)
         assert outcome == READ or kind == "command lines", words  # some lines are wrong on purpose

@@ -104,7 +104,8 @@ LARGEST_CELL = 2**40  # cell number of distant coordinates; int64 holds this cel
 def near_pairs(broad, R, p, margin):
     """Write the pairs that may have gap <= margin to `broad.pairs`; return how many, -1 if they do
     not fit."""
-    width, count = broad.cell_size + margin, 0
+    width = broad.cell_size + margin
+    count = 0
     broad.first[:] = -1
     for m in range(broad.moving.shape[0]):
         i = broad.moving[m]
@@ -123,14 +124,17 @@ def near_pairs(broad, R, p, margin):
                     count = keep_pair(broad, i, broad.moving[n], margin, count)
                 n = broad.next[n]
         bucket = bucket_of(broad, broad.cell[m, 0], broad.cell[m, 1], broad.cell[m, 2])
-        broad.next[m], broad.first[bucket] = broad.first[bucket], m
+        broad.next[m] = broad.first[bucket]
+        broad.first[bucket] = m
         for j in broad.static:
             count = keep_pair(broad, i, j, margin, count)
     sort_keys(broad.key, count)
     for k in range(count):
-        i, j = broad.key[k] // broad.radius.shape[0], broad.key[k] % broad.radius.shape[0]
+        i = broad.key[k] // broad.radius.shape[0]
+        j = broad.key[k] % broad.radius.shape[0]
         first = 0 if broad.allowed[i, j] == 1 else 1
-        broad.pairs[k, first], broad.pairs[k, 1 - first] = i, j
+        broad.pairs[k, first] = i
+        broad.pairs[k, 1 - first] = j
     return count
 
 
@@ -149,10 +153,8 @@ def keep_pair(broad, i, j, margin, count):
         i, j = j, i
     if broad.allowed[i, j] == 0:
         return count
-    reach, apart = (
-        broad.radius[i] + broad.radius[j] + margin,
-        subtract(load(broad.center, i), load(broad.center, j)),
-    )
+    reach = broad.radius[i] + broad.radius[j] + margin
+    apart = subtract(load(broad.center, i), load(broad.center, j))
     if dot(apart, apart) > reach * reach:
         return count
     if not 0 <= count < broad.key.shape[0]:
@@ -169,7 +171,8 @@ def sort_keys(keys, count):
     while gap > 1:
         gap = max(1, 4 * gap // 9)
         for k in range(gap, count):
-            key, at = keys[k], k
+            key = keys[k]
+            at = k
             while at >= gap and keys[at - gap] > key:
                 keys[at] = keys[at - gap]
                 at -= gap

@@ -43,7 +43,9 @@ def gather_group(world, state, island):
 
     M is block diagonal, so its factor is too.
     """
-    size, dofs, work = 0, state.dofs, state.work
+    size = 0
+    dofs = state.dofs
+    work = state.work
     for t in range(world.tree_start.shape[0]):
         if state.island_of_tree[t] == island:
             for k in range(world.tree_start[t], world.tree_stop[t]):
@@ -61,7 +63,8 @@ def gather_group(world, state, island):
 def gather_rows(world, state, island, size):
     """Write the rows of J_c, return how many: (11) against the world; (12), or both of (13)-(14),
     for two bodies."""
-    contacts, count = state.contacts, 0
+    contacts = state.contacts
+    count = 0
     for i in range(state.contact_count[0]):
         if (
             not contacts.collides[i]
@@ -94,7 +97,8 @@ def largest_share(impulse, dofs, size, dt, force_limit):
     """
     share = 1.0
     for i in range(size):
-        force, limit = abs(impulse[i]) / dt, force_limit[dofs[i]]
+        force = abs(impulse[i]) / dt
+        limit = force_limit[dofs[i]]
         if share * force > limit:
             share = limit / force
     for i in range(size):
@@ -114,7 +118,9 @@ def apply_group(state, size, share):
     (`iapb.contact.kernels.passive`). With Δv = v⁺ − v⁻ and M Δv = Jᵀp the loss is −(v⁻ + Δv/2)·Jᵀp.
     """
     work = state.work
-    v, change, after = work.v[:size], work.v_change[:size], work.shifted[:size]
+    v = work.v[:size]
+    change = work.v_change[:size]
+    after = work.shifted[:size]
     for i in range(size):
         change[i] = work.v_plus[i] - v[i]
     write_step(v, change, share, after)
@@ -175,7 +181,8 @@ def add_friction_to_impact(world, state, size, count, rank, only_push):
 @kernel
 def gather_tangents(world, state, size, count):
     """Write μ of each contact and the tangents' rows of J."""
-    contacts, f = state.contacts, state.friction_work
+    contacts = state.contacts
+    f = state.friction_work
     tangents = f.velocity.shape[0]
     for r in range(count):
         i = state.rows[r]
@@ -195,7 +202,9 @@ def keep_together(state, size, count):
     Writes the least velocity of each along unit rows: −e γ⁻ or zero where it opens, else that after
     Poisson's law.
     """
-    work, least, kept = state.work, state.friction_work.least, 0
+    work = state.work
+    least = state.friction_work.least
+    kept = 0
     opens = OPENS * math.sqrt(dot_of(work.u[:size], work.u[:size]))
     for r in range(count):
         before = after = 0.0
@@ -226,7 +235,9 @@ def push_with_friction(world, state, size, count, smallest, tolerance):
     all contacts decide which open: a tall box that lands flat and slides tips over its leading
     edge, a disc climbs the wall it rolls into.
     """
-    work, f, together = state.work, state.friction_work, count
+    work = state.work
+    f = state.friction_work
+    together = count
     rank, clamp, solved = resolve_unequal(world, state, size, count, smallest, tolerance)
     if solved:
         together = keep_together(state, size, count)
@@ -238,7 +249,8 @@ def push_with_friction(world, state, size, count, smallest, tolerance):
         gather_tangents(world, state, size, count)
         swept, met = sweep_impact(size, count, work, f, state.row_impulse)
         if met:
-            factor, share = swept, 1.0
+            factor = swept
+            share = 1.0
     return rank, clamp * factor, share, solved and met
 
 
@@ -246,29 +258,27 @@ def push_with_friction(world, state, size, count, smallest, tolerance):
 def resolve_rows(world, state, size, count):
     """Resolve by (20)-(21) or by the scene's extensions of them; return (rank, clamp, share of
     friction, solved)."""
-    work, contacts, e, unequal, solved, friction_share = (
-        state.work,
-        state.contacts,
-        world.restitution,
-        False,
-        True,
-        1.0,
-    )
+    work = state.work
+    contacts = state.contacts
+    e = world.restitution
+    unequal = False
+    solved = True
+    friction_share = 1.0
     tolerance = rank_tolerance(work.lower[:size, :size])
     if (
         world.switches.unequal_restitution
         or world.switches.pushing
         or world.switches.implicit_contact
     ):
-        e, largest, unequal = (
-            1.0,
-            0.0,
-            world.switches.pushing or world.switches.implicit_contact and count > 1,
-        )
+        e = 1.0
+        largest = 0.0
+        unequal = world.switches.pushing or world.switches.implicit_contact and count > 1
         for r in range(count):
             i = state.rows[r]
             own = pair_restitution(world, contacts, i)
-            state.row_restitution[r], e, largest = own, min(e, own), max(largest, own)
+            state.row_restitution[r] = own
+            e = min(e, own)
+            largest = max(largest, own)
         unequal = unequal or e < largest
     whiten_impact(size, count, unequal or world.switches.impact_friction, work)
     if (
@@ -287,7 +297,8 @@ def resolve_rows(world, state, size, count):
         if unequal and solved:  # Poisson's law needs no basis of the rows, friction does
             span = orthonormal_basis(size, count, tolerance, size, work)
         friction_share, factor, met = add_friction_to_impact(world, state, size, count, span, False)
-        clamp, solved = clamp * factor, solved and met
+        clamp = clamp * factor
+        solved = solved and met
     elif not (unequal and solved):
         minimum_norm_impulses(
             size, count, rank, work.length, work.change[:size], state.row_impulse, work
@@ -298,10 +309,14 @@ def resolve_rows(world, state, size, count):
 @kernel
 def resolve_island(world, state, island):
     """Resolve one simultaneous impact; scale it to the device if the scene has limits; log it."""
-    size, work, log = gather_group(world, state, island), state.work, state.impacts
+    size = gather_group(world, state, island)
+    work = state.work
+    log = state.impacts
     count = gather_rows(world, state, island, size)
     rank, clamp, friction_share, solved = resolve_rows(world, state, size, count)
-    share, line, approaching = 1.0, log.logged[0], 0
+    share = 1.0
+    line = log.logged[0]
+    approaching = 0
     if world.switches.impulse_limit:
         share = largest_share(work.momentum, state.dofs, size, world.dt, world.impulse_limit)
     if world.switches.spreading:
@@ -315,20 +330,23 @@ def resolve_island(world, state, island):
         if (
             r == 0 or state.rows[r] != state.rows[r - 1]
         ):  # of two per-body rows the first is the one on body a
-            i, impulse = state.rows[r], applied * state.row_impulse[r]
+            i = state.rows[r]
+            impulse = applied * state.row_impulse[r]
             before = state.contact_impulse[i]
             state.contact_impulse[i] = impulse if before == 0.0 else before + impulse
         gamma = 0.0
         for k in range(size):
             gamma += work.rows[k, r] * (work.u[k] + applied * work.change[k])
         approaching += work.length[r] * gamma < -world.approach_velocity
-    log.group[line], log.rows[line], log.rank[line] = island, count, rank
-    log.scale[line], log.clamp[line], log.energy_lost[line] = share, clamp, lost
-    log.friction_share[line], log.solved[line], log.approaching[line] = (
-        friction_share,
-        solved and clamp > 0.0,
-        approaching,
-    )
+    log.group[line] = island
+    log.rows[line] = count
+    log.rank[line] = rank
+    log.scale[line] = share
+    log.clamp[line] = clamp
+    log.energy_lost[line] = lost
+    log.friction_share[line] = friction_share
+    log.solved[line] = solved and clamp > 0.0
+    log.approaching[line] = approaching
     log.time[line] = state.cut.elapsed[0]
     copy_into(log.q[line], state.q)
     copy_into(log.v_minus[line], state.v)
@@ -365,12 +383,10 @@ def strike_again(world, state):
     The impacts of a step are at most as many as its log has lines. What is left strikes in the next
     step.
     """
-    contacts, now, count, some = (
-        state.contacts,
-        state.scratch_contacts,
-        state.contact_count[0],
-        False,
-    )
+    contacts = state.contacts
+    now = state.scratch_contacts
+    count = state.contact_count[0]
+    some = False
     if not world.switches.implicit_contact or world.switches.impulse_limit:
         return False
     for i in range(count):
@@ -385,9 +401,12 @@ def strike_again(world, state):
             and e > 0.0
             and now.normal_velocity[i] < -world.approach_velocity
         ):
-            contacts.mark[i], contacts.collides[i], some = STRIKES, True, True
+            contacts.mark[i] = STRIKES
+            contacts.collides[i] = True
+            some = True
         elif contacts.mark[i] == STRIKES and not contacts.idle[i]:
-            contacts.mark[i], contacts.collides[i] = 0, False
+            contacts.mark[i] = 0
+            contacts.collides[i] = False
     if not some:
         return False
     find_islands(world, state)

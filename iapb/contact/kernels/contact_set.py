@@ -22,11 +22,16 @@ TOUCHING = 1e-12
 # its support in a step, beyond what the step before shows.
 CLOSE = 1e-9
 
-_UNDECIDED, _KEPT, _DROPPED = 0, 1, 2  # marks while contacts are clustered
+# marks while contacts are clustered
+_UNDECIDED = 0
+_KEPT = 1
+_DROPPED = 2
 
 # Marks in an impact under implicit contact: it strikes, it carries a load, it would strike but the
 # log is full.
-STRIKES, HOLDS, LEFT = 1, 2, 3
+STRIKES = 1
+HOLDS = 2
+LEFT = 3
 
 
 @kernel
@@ -56,10 +61,9 @@ def cluster(world, contacts, count):
     surface is closer. So kept contacts of a surface are at least that distance apart; they keep
     their order.
     """
-    distance, near = (
-        world.cluster_distance,
-        False,
-    )  # usually none are, and to see this is cheaper than the clustering
+    # usually none are, and to see this is cheaper than the clustering
+    distance = world.cluster_distance
+    near = False
     for i in range(count):
         for j in range(i):
             near = near or squared_distance(contacts, i, contacts, j) < distance * distance
@@ -156,7 +160,8 @@ def join(world, contacts, i, group_of_tree):
     """Merge the groups of the two trees of contact i; the root of a group is its smallest tree."""
     if contacts.body_b[i] < 0:
         return
-    a, b = world.tree_of_body[contacts.body_a[i]], world.tree_of_body[contacts.body_b[i]]
+    a = world.tree_of_body[contacts.body_a[i]]
+    b = world.tree_of_body[contacts.body_b[i]]
     while group_of_tree[a] != a:
         a = group_of_tree[a]
     while group_of_tree[b] != b:
@@ -180,16 +185,16 @@ def classify(world, state, count):
     approaching contact of the group, new or old, enters the impact. `spreading`, trees with an
     unfinished impulse, is cleared if the group no longer collides.
     """
-    contacts, groups, states, spreading = (
-        state.contacts,
-        state.group_of_tree,
-        state.state_of_tree,
-        state.spreading,
-    )
-    trees, approaching = groups.shape[0], False
+    contacts = state.contacts
+    groups = state.group_of_tree
+    states = state.state_of_tree
+    spreading = state.spreading
+    trees = groups.shape[0]
+    approaching = False
     for t in range(trees):
         if state.moving[t]:
-            groups[t], states[t] = t, FREE
+            groups[t] = t
+            states[t] = FREE
     for i in range(count):
         if not contacts.idle[i]:
             join(world, contacts, i, groups)
@@ -240,7 +245,8 @@ def find_islands(world, state):
         state.collides_of_tree[t] = False
     if not any_collides:
         return False
-    contacts, islands = state.contacts, state.island_of_tree
+    contacts = state.contacts
+    islands = state.island_of_tree
     for i in range(state.contact_count[0]):
         if contacts.collides[i]:
             join(world, contacts, i, islands)
@@ -270,7 +276,9 @@ def add_supports(world, state):
     ball would hardly bounce on a book that lies on the floor. Where nothing bounces, resting
     contact stops all, with friction.
     """
-    contacts, begin, bounces = state.contacts, 0, False
+    contacts = state.contacts
+    begin = 0
+    bounces = False
     for i in range(state.contact_count[0] if world.switches.implicit_contact else 0):
         if contacts.idle[i]:
             continue
@@ -284,4 +292,5 @@ def add_supports(world, state):
         if before >= 0:
             begin = before + 1
             if state.previous.normal_force[before] > 0.0:
-                contacts.mark[i], contacts.collides[i] = HOLDS, True
+                contacts.mark[i] = HOLDS
+                contacts.collides[i] = True

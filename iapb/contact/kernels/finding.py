@@ -30,13 +30,16 @@ def find_contacts(world, state):
 
     Those found at the end of the step before are taken, unless somebody has moved the bodies since.
     """
-    now, before = state.contacts, state.previous
+    now = state.contacts
+    before = state.previous
     for i in range(
         state.contact_count[0]
     ):  # `mark_new` and friction compare with those of the last step
         copy_contact(before, i, now, i)
-        before.normal_force[i], before.expected[i] = now.normal_force[i], now.expected[i]
-        before.sticks[i], before.span[i] = now.sticks[i], now.span[i]
+        before.normal_force[i] = now.normal_force[i]
+        before.expected[i] = now.expected[i]
+        before.sticks[i] = now.sticks[i]
+        before.span[i] = now.span[i]
         if world.switches.implicit_contact and world.switches.friction:
             store(before.point_a, i, load(now.point_a, i))
             store(before.point_b, i, load(now.point_b, i))
@@ -91,7 +94,9 @@ def present_contacts(world, state, contacts, before, count_before):
 def detect_contacts(world, state, contacts, before, count_before):
     """Find, cluster and complete the contacts of the present configuration; return how many, -1:
     too many."""
-    R, p, pairs = state.body.rotation, state.body.position, world.pairs
+    R = state.body.rotation
+    p = state.body.position
+    pairs = world.pairs
     # all corners of a face that touches, whatever its rounding, or the bend of a rigid contact
     margin = TOUCHING if world.switches.implicit_contact else 0.0
     if world.rigid:
@@ -112,7 +117,8 @@ def detect_contacts(world, state, contacts, before, count_before):
     if world.switches.clustering:
         count = cluster(world, contacts, count)
     if world.switches.joint_limits and count >= 0:
-        margin, first = CLOSE if world.switches.touch else 0.0, count
+        margin = CLOSE if world.switches.touch else 0.0
+        first = count
         count = add_stops(world, state, contacts, first, margin)
         for i in range(first, count):
             contacts.gap[i] = min(contacts.gap[i], 0.0)
@@ -137,7 +143,8 @@ def leave_out_apart(contacts, count, before, count_before):
     return how many stay."""
     kept = 0
     for i in range(count):
-        allowed, gap = 0.0, contacts.gap[i]
+        allowed = 0.0
+        gap = contacts.gap[i]
         for k in range(count_before if gap > 0.0 else 0):
             if same_name(contacts, i, before, k):
                 allowed = may_lift(before, k)

@@ -84,7 +84,9 @@ def whiten_impact(d, count, exact, work):
     exact : whether to whiten by L C (`correct_factor`) where L alone is felt; else `refine_change`
         corrects the result.
     """
-    columns, length, u = work.columns, work.length, work.u[:d]
+    columns = work.columns
+    length = work.length
+    u = work.u[:d]
     to_whitened(work.lower, work.v[:d], u)
     whiten_columns(work.lower[:d, :d], columns, count)
     work.corrected[0] = exact and correct_factor(d, work)
@@ -112,11 +114,9 @@ def factored_impact(d, count, restitution, tolerance, budget, clamped, work):
     Every row is an equality J v⁺ = −e J v⁻, whatever the sign of its velocity; the caller chooses
     the rows.
     """
-    rank, u, change = (
-        orthonormal_basis(d, count, tolerance, budget, work),
-        work.u[:d],
-        work.change[:d],
-    )
+    rank = orthonormal_basis(d, count, tolerance, budget, work)
+    u = work.u[:d]
+    change = work.change[:d]
     change[:] = 0.0
     for j in range(rank):
         add_multiple(change, -((1.0 + restitution) * dot_of(work.basis[j], u)), work.basis[j])
@@ -144,7 +144,10 @@ def apply_change(d, clamped, work):
     With the clamp, v⁺ has no more kinetic energy than v in real arithmetic; α = 0 if no other α is
     found.
     """
-    v, v_change, v_plus, alpha = work.v[:d], work.v_change[:d], work.v_plus[:d], 1.0
+    v = work.v[:d]
+    v_change = work.v_change[:d]
+    v_plus = work.v_plus[:d]
+    alpha = 1.0
     if clamped:
         alpha = passive_step(work.mass, v, v_change, alpha, v_plus)
     else:
@@ -200,7 +203,9 @@ def correct_factor(d, work):
     C is the Cholesky factor of I + E, E = L⁻¹ (M − L Lᵀ) L⁻ᵀ with the residual in double-double.
     All that follows then sees M itself: LCPs and friction, whose limits depend on it, too.
     """
-    lower, correction, felt = work.lower[:d, :d], work.correction[:d, :d], 0.0
+    lower = work.lower[:d, :d]
+    correction = work.correction[:d, :d]
+    felt = 0.0
     for i in range(d):
         for j in range(i + 1):
             high, low = symmetric_entry(work.mass, i, j)
@@ -231,15 +236,15 @@ def refine_change(d, rank, work):
     Without it the clamp alone would compensate E, which reduces restitution. On return work.change
     is L⁻¹ of the generalized impulse.
     """
-    change, deviation, inside, shifted = (
-        work.change[:d],
-        work.deviation[:d],
-        work.along[:d],
-        work.shifted[:d],
-    )
+    change = work.change[:d]
+    deviation = work.deviation[:d]
+    inside = work.along[:d]
+    shifted = work.shifted[:d]
     for k in range(d):
-        shifted[k], inside[k] = change[k], 0.0
-    size, lower = dot_of(change, change), work.lower
+        shifted[k] = change[k]
+        inside[k] = 0.0
+    size = dot_of(change, change)
+    lower = work.lower
     for _ in range(_PASSES):
         for i in range(d):
             high = low = 0.0

@@ -73,21 +73,21 @@ def add_impact_friction(d, count, rank, work, push, f, only_push, impulses):
     only_push : whether contacts only push; `impulses` then holds the normal impulses of Poisson's
         law.
     """
-    p, u, change, moved = (
-        f.p[: count * f.velocity.shape[0]],
-        work.u[:d],
-        work.change[:d],
-        f.moved[:d],
-    )
+    p = f.p[: count * f.velocity.shape[0]]
+    u = work.u[:d]
+    change = work.change[:d]
+    moved = f.moved[:d]
     largest = 0.0
     for j in range(
         p.shape[0]
     ):  # whiten the tangents' rows, and remove the span of the normal rows: B and A_t Qᵀ
-        row, slip = f.rows[j, :d], 0.0
+        row = f.rows[j, :d]
+        slip = 0.0
         whiten_row(row, work)
         for k in range(d):
             slip += row[k] * (u[k] + change[k])
-        f.speed[j], before = slip, dot_of(row, row)
+        f.speed[j] = slip
+        before = dot_of(row, row)
         largest = max(largest, before)
         if orthogonalize(row, work.basis, rank, f.normal_part[j]) <= GONE * GONE * before:
             row[:] = 0.0
@@ -125,13 +125,16 @@ def share_within_cone(count, f):
     """Return the largest β with β |p_t| ≤ μ p(β) at every contact; p(β) is linear between `without`
     and `wanted`."""
     size = f.velocity.shape[0]
-    share, largest = 1.0, 0.0
+    share = 1.0
+    largest = 0.0
     for i in range(count):
         largest = max(largest, abs(f.wanted[i]))
     for i in range(count):
-        own, mu = f.p[i * size : (i + 1) * size], f.coefficient[i]
+        own = f.p[i * size : (i + 1) * size]
+        mu = f.coefficient[i]
         length = math.sqrt(dot_of(own, own))
-        excess, room = length - mu * max(f.wanted[i], 0.0), mu * max(f.without[i], 0.0)
+        excess = length - mu * max(f.wanted[i], 0.0)
+        room = mu * max(f.without[i], 0.0)
         if excess > mu * CONE_ROUNDING * largest and length > 0.0:
             share = min(share, room / (room + length - mu * f.wanted[i]))
     return share
@@ -141,7 +144,8 @@ def share_within_cone(count, f):
 def passive_share(u, change, moved):
     """Return the largest α in [0, 1] with ½|Δ_t|² α² + (u·Δ_t) α ≤ loss of the normal part: the sum
     gains no energy."""
-    square, slope = dot_of(moved, moved), dot_of(u, moved)
+    square = dot_of(moved, moved)
+    slope = dot_of(u, moved)
     lost = max(0.0, -dot_of(u, change) - 0.5 * dot_of(change, change))
     if square == 0.0 or 0.5 * square + slope <= lost:
         return 1.0
@@ -161,11 +165,11 @@ def passive_share(u, change, moved):
 # Largest number of rounds. Convergence usually takes 3 to 30; an iteration that has not converged
 # by then oscillates or diverges (no solution), or no non-negative impulses exist.
 ROUNDS = 200
-UNDAMPED, HALVED = (
-    20,
-    120,
-)  # rounds after which limits move half way only, then a fifth: large μ can make them swing
-HALF, FIFTH = 0.5, 0.2
+# rounds after which limits move half way only, then a fifth: large μ can make them swing
+UNDAMPED = 20
+HALVED = 120
+HALF = 0.5
+FIFTH = 0.2
 # largest over-relaxation of a limit, for friction that loads its own contact, μ ∂p_n/∂p_t → 1
 STRIDE = 10.0
 AT_LIMIT = 0.99  # share of a limit: a contact below it sticks
@@ -177,7 +181,8 @@ STILL = 1e-12
 MET = 1e-10
 # Sweeps of p_t in a round, as the limits change anyway: until one changes velocities by a tenth of
 # the first.
-SWEEPS, SETTLED = 10, 0.1
+SWEEPS = 10
+SETTLED = 0.1
 HELD_SWEEPS = 200  # with the limits held for good
 # Sweeps over normal impulses and friction. Nearly parallel contacts share their load anew for
 # thousands of sweeps, long after the velocities are right. Of 54 impacts that the rounds failed to
@@ -238,14 +243,18 @@ def sweep_impact(d, count, work, f, impulses):
     scratch stays as it is.
     impulses : (≥count,) of the result so far, from which the sweeps start, as they do from `f.p`.
     """
-    size, u, moved, p_n = f.velocity.shape[0], work.u[:d], f.moved[:d], f.wanted
+    size = f.velocity.shape[0]
+    u = work.u[:d]
+    moved = f.moved[:d]
+    p_n = f.wanted
     for j in range(count * size):
         whiten_row(f.rows[j, :d], work)
         f.speed[j] = dot_of(f.rows[j, :d], u)
     for i in range(count):
         set_inertia(f, i, d)
         p_n[i] = impulses[i] * work.length[i]
-    speed, fastest = math.sqrt(dot_of(u, u)), math.inf
+    speed = math.sqrt(dot_of(u, u))
+    fastest = math.inf
     for _ in range(IMPACT_SWEEPS):
         combine(count, f, d)
         for k in range(d):
@@ -280,7 +289,9 @@ def sweep_impact(d, count, work, f, impulses):
 def _start(count, rank, work, push, f, d):
     """Factor the normal rows and write the impulses without friction; return whether non-negative
     ones exist."""
-    change, left, size = work.change[:d], f.left[:d], f.velocity.shape[0]
+    change = work.change[:d]
+    left = f.left[:d]
+    size = f.velocity.shape[0]
     length = math.sqrt(dot_of(change, change))
     for k in range(d):
         f.moved[k] = -change[k] / length if length > 0.0 else 0.0
@@ -301,7 +312,8 @@ def _start(count, rank, work, push, f, d):
         return False
     for i in range(count):
         f.without[i] = length * f.without[i] / work.length[i] if work.length[i] > 0.0 else 0.0
-        f.sliding[i], f.limit[i] = f.coefficient[i], 0.0
+        f.sliding[i] = f.coefficient[i]
+        f.limit[i] = 0.0
     _move_normals(
         count, rank, work, f, False
     )  # an active set loads only a few of redundant contacts
@@ -312,7 +324,8 @@ def _start(count, rank, work, push, f, d):
 def _move_normals(count, rank, work, f, near):
     """Move `f.wanted` to the nearest normal impulses consistent with p_t, or those of least norm;
     return the defect."""
-    left, defect = f.left[:rank], 0.0
+    left = f.left[:rank]
+    defect = 0.0
     copy_into(left, f.target)
     for j in range(count * f.velocity.shape[0]):
         if f.p[j] != 0.0:
@@ -333,11 +346,9 @@ def _move_normals(count, rank, work, f, near):
 def _settle(count, rank, work, f, d, scale, pushes):
     """Iterate normal impulses, limits and p_t; return whether the last round changed less than MET
     times the scale."""
-    size, speed, still = (
-        f.velocity.shape[0],
-        math.sqrt(dot_of(work.u[:d], work.u[:d])),
-        STILL * scale,
-    )
+    size = f.velocity.shape[0]
+    speed = math.sqrt(dot_of(work.u[:d], work.u[:d]))
+    still = STILL * scale
     moved = math.inf
     for done in range(ROUNDS):
         defect = _move_normals(count, rank, work, f, pushes)
@@ -345,7 +356,8 @@ def _settle(count, rank, work, f, d, scale, pushes):
         for i in range(count):
             if pushes:
                 f.wanted[i] = max(f.wanted[i], 0.0)
-            own, stride = f.p[i * size : (i + 1) * size], 1.0
+            own = f.p[i * size : (i + 1) * size]
+            stride = 1.0
             length = math.sqrt(dot_of(own, own))
             if (
                 length > 0.0 and length >= AT_LIMIT * f.limit[i]
@@ -358,7 +370,8 @@ def _settle(count, rank, work, f, d, scale, pushes):
         if moved > still:
             friction_sweeps(count, f, d, SWEEPS - 1, SETTLED * moved)
         for i in range(count):  # an undamped limit that holds p_t would move it on
-            own, change = f.p[i * size : (i + 1) * size], abs(f.change[i])
+            own = f.p[i * size : (i + 1) * size]
+            change = abs(f.change[i])
             length = math.sqrt(dot_of(own, own))
             if length >= f.limit[i] - STRIDE * change:
                 moved = max(moved, f.inertia[i] * min(change, length))
@@ -373,12 +386,14 @@ def _settle(count, rank, work, f, d, scale, pushes):
 def _trim(count, rank, work, f, near):
     """Shorten each contact's p_t that the last round left outside its cone, and update the normal
     impulses."""
-    size, largest = f.velocity.shape[0], 0.0
+    size = f.velocity.shape[0]
+    largest = 0.0
     for turn in range(TRIMS + 1):
         _move_normals(count, rank, work, f, near)
         within = True
         for i in range(count if turn < TRIMS else 0):
-            own, limit = f.p[i * size : (i + 1) * size], f.sliding[i] * max(f.wanted[i], 0.0)
+            own = f.p[i * size : (i + 1) * size]
+            limit = f.sliding[i] * max(f.wanted[i], 0.0)
             length = math.sqrt(dot_of(own, own))
             if length > limit:
                 within = False
@@ -405,9 +420,14 @@ SINGULAR = 1e-12
 def set_inertia(f, i, d):
     """Write the entries of B_i B_iᵀ, which has one or two rows, and its largest eigenvalue."""
     size = f.velocity.shape[0]
-    x, y = f.rows[i * size, :d], f.rows[i * size + size - 1, :d]
-    xx, xy, yy = dot_of(x, x), dot_of(x, y), dot_of(y, y)
-    f.block[i, 0], f.block[i, 1], f.block[i, 2] = xx, xy, yy
+    x = f.rows[i * size, :d]
+    y = f.rows[i * size + size - 1, :d]
+    xx = dot_of(x, x)
+    xy = dot_of(x, y)
+    yy = dot_of(y, y)
+    f.block[i, 0] = xx
+    f.block[i, 1] = xy
+    f.block[i, 2] = yy
     f.inertia[i] = xx if size == 1 else 0.5 * (xx + yy) + hypotenuse(0.5 * (xx - yy), xy)
 
 
@@ -446,8 +466,12 @@ def friction_sweeps(count, f, d, sweeps, still):
 def _slide(f, i, d):
     """Move one contact's impulse to stop its slip, or towards its limit; return the change of
     velocity [m/s]."""
-    velocity, size, moved = f.velocity, f.velocity.shape[0], f.moved[:d]
-    first, limit, inertia = i * size, f.limit[i], f.inertia[i]
+    velocity = f.velocity
+    size = f.velocity.shape[0]
+    moved = f.moved[:d]
+    first = i * size
+    limit = f.limit[i]
+    inertia = f.inertia[i]
     for a in range(size):
         velocity[a] = f.speed[first + a] + dot_of(f.rows[first + a], moved)
     fastest = math.sqrt(dot_of(velocity, velocity))
@@ -476,12 +500,18 @@ def _stops(f, i, first):
         f.velocity.shape[0] != 2
     ):  # of two, steps of length 1/ρ would need κ(B_i B_iᵀ) sweeps; with a lever, hundreds
         return False
-    xx, xy, yy, v, w = f.block[i, 0], f.block[i, 1], f.block[i, 2], f.velocity[0], f.velocity[1]
+    xx = f.block[i, 0]
+    xy = f.block[i, 1]
+    yy = f.block[i, 2]
+    v = f.velocity[0]
+    w = f.velocity[1]
     det = xx * yy - xy * xy
     if det <= SINGULAR * xx * yy:
         return False
-    one, two = f.p[first] - (yy * v - xy * w) / det, f.p[first + 1] - (xx * w - xy * v) / det
+    one = f.p[first] - (yy * v - xy * w) / det
+    two = f.p[first + 1] - (xx * w - xy * v) / det
     if one * one + two * two > f.limit[i] * f.limit[i]:
         return False
-    f.velocity[0], f.velocity[1] = one, two
+    f.velocity[0] = one
+    f.velocity[1] = two
     return True

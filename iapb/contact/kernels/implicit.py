@@ -118,7 +118,9 @@ class RestWork(NamedTuple):
 def rest_implicitly(world, state, touches, rubs):
     """Give v the forces of all resting contacts and of joint friction; write them to the contacts,
     to penalty_force and friction_force."""
-    work, contacts, some = state.rest_work, state.contacts, False
+    work = state.rest_work
+    contacts = state.contacts
+    some = False
     work.first[:] = -1
     for i in range(state.contact_count[0] - 1 if touches else -1, -1, -1):
         if contacts.idle[i]:
@@ -128,10 +130,13 @@ def rest_implicitly(world, state, touches, rubs):
             store(contacts.friction_force, i, (0.0, 0.0, 0.0))
         group = group_of_contact(world, contacts, i, state.group_of_tree)
         if contacts.mark[i] != LEFT:
-            work.next[i], work.first[group], some = work.first[group], i, True
+            work.next[i] = work.first[group]
+            work.first[group] = i
+            some = True
     for t in range(world.tree_start.shape[0] if world.switches.joint_friction else 0):
         if state.moving[t] and is_dry(world, t):
-            group, some = state.group_of_tree[t], True
+            group = state.group_of_tree[t]
+            some = True
             work.first[group] = work.first[group] if work.first[group] >= 0 else DRY
     if not some:
         return
@@ -139,7 +144,8 @@ def rest_implicitly(world, state, touches, rubs):
     for t in range(world.tree_start.shape[0] - 1, -1, -1):
         group = state.group_of_tree[t]
         if group != t:  # its first tree is the group's number
-            work.next_tree[t], work.next_tree[group] = work.next_tree[group], t
+            work.next_tree[t] = work.next_tree[group]
+            work.next_tree[group] = t
     for group in range(world.tree_start.shape[0]):
         if work.first[group] >= 0 or work.first[group] == DRY:
             rest_group(world, state, group, 1 + world.tangents if rubs else 1)
@@ -167,13 +173,18 @@ def rest_group(world, state, group, s):
 
     The first guess is the velocity before the forces of the step.
     """
-    work, size, t = state.rest_work, 0, group
+    work = state.rest_work
+    size = 0
+    t = group
     while t >= 0:
         work.offset[t] = begin = size
         for dof in range(world.tree_start[t], world.tree_stop[t]):
-            work.dof[size], work.begin[size], work.envelope[size] = dof, begin, begin
+            work.dof[size] = dof
+            work.begin[size] = begin
+            work.envelope[size] = begin
             work.end[size] = begin + world.tree_stop[t] - world.tree_start[t]
-            work.free[size], work.v[size] = state.v[dof], state.start_v[dof]
+            work.free[size] = state.v[dof]
+            work.v[size] = state.start_v[dof]
             work.dry[size] = state.h[0] * world.joint_friction[dof]
             size += 1
         t = work.next_tree[t]
@@ -192,7 +203,8 @@ def rest_group(world, state, group, s):
 def bends_too_far(world, state, size, count, s):
     """Return whether what contacts bend in a step gives the bodies noticeable energy: then the step
     is too long for their arcs."""
-    work, bends = state.rest_work, False
+    work = state.rest_work
+    bends = False
     for j in range(count * s):
         bends = bends or work.bend[j] != 0.0
     if not bends:
@@ -222,7 +234,9 @@ def stiffness_of_group(world, work, group, h):
     """
     if not world.rigid:
         return world.stiffness, world.stiffness * h + world.damping
-    heaviest, lightest, t = 0.0, math.inf, group
+    heaviest = 0.0
+    lightest = math.inf
+    t = group
     while t >= 0:
         heaviest = max(heaviest, world.tree_mass[t])
         lightest = min(lightest, world.tree_mass[t])
@@ -234,15 +248,14 @@ def stiffness_of_group(world, work, group, h):
 @kernel
 def gather_contacts(world, state, group, s):
     """Write rows, limits and softness of the group's contacts; return their number."""
-    work, contacts, count, begin, i = (
-        state.rest_work,
-        state.contacts,
-        0,
-        0,
-        state.rest_work.first[group],
-    )
+    work = state.rest_work
+    contacts = state.contacts
+    count = 0
+    begin = 0
+    i = state.rest_work.first[group]
     while i >= 0:
-        work.contact[count], work.limit[count] = i, 0.0
+        work.contact[count] = i
+        work.limit[count] = 0.0
         trees = trees_of_contact(world, work, contacts, i, count)
         if trees[1] >= 0:
             high = work.offset[max(trees)]
@@ -256,14 +269,13 @@ def gather_contacts(world, state, group, s):
         before = contact_before(state, i, begin)
         store(contacts.drift, i, (0.0, 0.0, 0.0))
         if before >= 0:
-            begin, force = before + 1, state.previous.normal_force[before]
+            begin = before + 1
+            force = state.previous.normal_force[before]
             work.limit[count] = (
                 friction_of(world, contacts, i) * force * state.h[0] if s > 1 else 0.0
             )
-            bend, span = (
-                contacts.gap[i] - state.previous.expected[before],
-                state.previous.span[before],
-            )
+            bend = contacts.gap[i] - state.previous.expected[before]
+            span = state.previous.span[before]
             if force > 0.0 and abs(bend) > TOUCHING and span >= SHORT * world.dt:
                 if span < world.dt or state.h[0] < world.dt:  # it grows with the square of time
                     bend *= world.dt / span * (state.h[0] / span)
@@ -272,7 +284,8 @@ def gather_contacts(world, state, group, s):
                 follow_arc(world, state, before, i, count * s, s)
         if contacts.lift[i] > 0.0:
             work.bend[count * s] = contacts.lift[i] / state.h[0]
-        count, i = count + 1, work.next[i]
+        count = count + 1
+        i = work.next[i]
     return count
 
 
@@ -300,7 +313,9 @@ def moved_aside(state, before):
     a third of the angle, to third order. This is no slip.
     """
     old = state.previous
-    a, b, n = old.body_a[before], old.body_b[before], load(old.normal, before)
+    a = old.body_a[before]
+    b = old.body_b[before]
+    n = load(old.normal, before)
     apart = subtract(
         placed(state, a, load(old.point_a, before)), placed(state, b, load(old.point_b, before))
     )
@@ -310,7 +325,8 @@ def moved_aside(state, before):
 @kernel
 def follow_arc(world, state, before, i, row, s):
     """Write to the rows of contact i how much faster its points slide than J v says, so far."""
-    moved, old = moved_aside(state, before), state.previous
+    moved = moved_aside(state, before)
+    old = state.previous
     aside = subtract(moved, load(old.slid, before))
     if old.sticks[before]:
         drift = add(load(old.drift, before), moved)
@@ -327,7 +343,8 @@ def follow_arc(world, state, before, i, row, s):
 def trees_of_contact(world, work, contacts, i, r):
     """Return the two trees of contact i, the second −1: none, or the same; write what row r needs
     of them to `work`."""
-    a, b = world.tree_of_body[contacts.body_a[i]], contacts.body_b[i]
+    a = world.tree_of_body[contacts.body_a[i]]
+    b = contacts.body_b[i]
     trees = (a, -1 if b < 0 or world.tree_of_body[b] == a else world.tree_of_body[b])
     for side in range(2):
         t = trees[side]
@@ -340,7 +357,9 @@ def trees_of_contact(world, work, contacts, i, r):
 def along_row(work, r, j, v):
     """Return row j, of contact r, times v; each half of the row holds the entries of one of the
     contact's two trees."""
-    total, row, half = 0.0, work.rows[j], work.rows.shape[1] // 2
+    total = 0.0
+    row = work.rows[j]
+    half = work.rows.shape[1] // 2
     for side in range(2):
         at = work.at[r, side]
         for k in range(work.size[r, side]):
@@ -351,7 +370,8 @@ def along_row(work, r, j, v):
 @kernel
 def add_along_row(work, r, j, factor, out):
     """out += factor times row j, of contact r."""
-    row, half = work.rows[j], work.rows.shape[1] // 2
+    row = work.rows[j]
+    half = work.rows.shape[1] // 2
     for side in range(2):
         at = work.at[r, side]
         for k in range(work.size[r, side]):
@@ -369,10 +389,13 @@ def along_rows(work, count, s, v, out):
 @kernel
 def times_mass(world, state, size, v, out):
     """out <- M v of local velocities, with Δt D of damped joints."""
-    work, damped = state.rest_work, world.switches.joint_damping
+    work = state.rest_work
+    damped = world.switches.joint_damping
     for i in range(size):
         dof = work.dof[i]
-        total, row, ahead = 0.0, state.mass_matrix[dof], dof - i
+        total = 0.0
+        row = state.mass_matrix[dof]
+        ahead = dof - i
         for j in range(work.begin[i], work.end[i]):
             total += row[ahead + j] * v[j]
         if damped:
@@ -398,7 +421,8 @@ def speed_at(work, j, share):
 def push(world, state, r, s, k, share):
     """Return the normal impulse Δt f of contact r at `share` of the present step."""
     work = state.rest_work
-    gap, gamma = state.contacts.gap[work.contact[r]], speed_at(work, r * s, share)
+    gap = state.contacts.gap[work.contact[r]]
+    gamma = speed_at(work, r * s, share)
     return state.h[0] * max(0.0, -work.stiffness[0] * gap - k * gamma)
 
 
@@ -448,7 +472,8 @@ def open_balance(world, state, size, count, s, k):
 
     It is a share of the energy of the step, that of v* and of the springs.
     """
-    work, squares = state.rest_work, 0.0
+    work = state.rest_work
+    squares = 0.0
     along_rows(work, count, s, work.v, work.speed)
     for i in range(size):
         work.change_of_v[i] = work.v[i] - work.free[i]
@@ -461,10 +486,13 @@ def open_balance(world, state, size, count, s, k):
         squares += work.p[r * s] * work.p[r * s]
     for i in range(size if world.switches.joint_friction else 0):
         work.balance[i] += dry_impulse(work, i, work.v[i])
-    given, springs = work.given[:size], 0.5 * squares / (state.h[0] * k) if squares > 0.0 else 0.0
+    given = work.given[:size]
+    springs = 0.5 * squares / (state.h[0] * k) if squares > 0.0 else 0.0
     for i in range(size):  # |L⁻¹ r|² = rᵀ M⁻¹ r
         dof = work.dof[i]
-        entry, row, ahead = work.balance[i], state.lower[dof], dof - i
+        entry = work.balance[i]
+        row = state.lower[dof]
+        ahead = dof - i
         for j in range(work.begin[i], i):
             entry -= row[ahead + j] * given[j]
         given[i] = entry / row[dof]
@@ -490,7 +518,8 @@ def add_square(work, matrix, r, one, other, factor):
     half = work.rows.shape[1] // 2
     for side in range(2):
         for i in range(work.size[r, side]):
-            row, left = work.at[r, side] + i, factor * work.rows[one, side * half + i]
+            row = work.at[r, side] + i
+            left = factor * work.rows[one, side * half + i]
             if left == 0.0:
                 continue
             for second in range(2):
@@ -502,9 +531,11 @@ def add_square(work, matrix, r, one, other, factor):
 @kernel
 def newton_matrix(world, state, size, count, s, k):
     """Write M + Jᵀ (∂p/∂γ) J to the lower triangle of `work.lower`, within the envelope."""
-    work, matrix = state.rest_work, state.work.lower
+    work = state.rest_work
+    matrix = state.work.lower
     for i in range(size):
-        dof, begin = work.dof[i], work.begin[i]
+        dof = work.dof[i]
+        begin = work.begin[i]
         for j in range(work.envelope[i], begin):
             matrix[i, j] = 0.0
         for j in range(begin, i + 1):
@@ -535,7 +566,8 @@ def factor_envelope(matrix, envelope, size):
     for i in range(size):
         row = matrix[i]
         for j in range(envelope[i], i):
-            total, other = row[j], matrix[j]
+            total = row[j]
+            other = matrix[j]
             for k in range(max(envelope[i], envelope[j]), j):
                 total -= row[k] * other[k]
             row[j] = total * other[j]
@@ -567,7 +599,8 @@ def solve(world, state, size, count, s, k):
     """Minimise for the present limits of friction, from work.v; return whether the balance is
     solved."""
     work = state.rest_work
-    v, step = work.v[:size], work.step[:size]
+    v = work.v[:size]
+    step = work.step[:size]
     worst = open_balance(world, state, size, count, s, k)
     for _ in range(ITERATIONS):
         if worst <= EXACT:
@@ -586,7 +619,8 @@ def solve(world, state, size, count, s, k):
             return True
         share = line_search(world, state, size, count, s, k)
         add_multiple(v, share, step)
-        before, worst = worst, open_balance(world, state, size, count, s, k)
+        before = worst
+        worst = open_balance(world, state, size, count, s, k)
         if share == 1.0 and worst <= GOOD and worst > 0.5 * before:
             return True
     return worst <= GOOD
@@ -598,7 +632,8 @@ def is_quadratic(world, state, size, count, s, k):
     friction stick; joints with friction stick, or slide on in their direction."""
     work = state.rest_work
     for i in range(size if world.switches.joint_friction else 0):
-        speed, after = work.v[i], work.v[i] + work.step[i]
+        speed = work.v[i]
+        after = work.v[i] + work.step[i]
         slides = max(abs(speed), abs(after)) > STICKING
         if (
             work.dry[i] > 0.0
@@ -625,7 +660,8 @@ def line_search(world, state, size, count, s, k):
     work = state.rest_work
     linear = mass_form(world, state, size, work.change_of_v, work.step)
     quadratic = mass_form(world, state, size, work.step, work.step)
-    low, high = 0.0, 1.0
+    low = 0.0
+    high = 1.0
     at_low = slope(world, state, size, count, s, k, 0.0, linear, quadratic)
     at_high = slope(world, state, size, count, s, k, 1.0, linear, quadratic)
     start = 1e-3 * abs(at_low)
@@ -637,9 +673,13 @@ def line_search(world, state, size, count, s, k):
         if abs(found) <= start:
             return share
         if found > 0.0:
-            high, at_high, at_low = share, found, 0.5 * at_low
+            high = share
+            at_high = found
+            at_low = 0.5 * at_low
         else:
-            low, at_low, at_high = share, found, 0.5 * at_high
+            low = share
+            at_low = found
+            at_high = 0.5 * at_high
     return low if low > 0.0 else high
 
 
@@ -647,7 +687,9 @@ def line_search(world, state, size, count, s, k):
 def follow_limits(world, state, count, s, share):
     """Move the limits of friction by a share towards those of the present impulses; False: none
     changed noticeably."""
-    work, changed, largest = state.rest_work, False, 0.0
+    work = state.rest_work
+    changed = False
+    largest = 0.0
     for r in range(count):
         largest = max(largest, work.p[r * s])
     for r in range(count):
@@ -665,7 +707,8 @@ def follow_limits(world, state, count, s, share):
 @kernel
 def spring_energy(world, state, count, s, share):
     """Return Φ [J] at the gaps that the velocity `share` v would lead to."""
-    work, total = state.rest_work, 0.0
+    work = state.rest_work
+    total = 0.0
     for r in range(count):
         gap = min(0.0, state.contacts.gap[work.contact[r]] + share * state.h[0] * work.speed[r * s])
         total += 0.5 * work.stiffness[0] * gap * gap
@@ -676,7 +719,8 @@ def spring_energy(world, state, count, s, share):
 def guard(world, state, size, count, s):
     """Shorten a solution that would make energy: with share 0, everything stands still and Φ stays
     as it is."""
-    work, share = state.rest_work, 1.0
+    work = state.rest_work
+    share = 1.0
     after = 0.5 * mass_form(world, state, size, work.v, work.v)
     allowed = (free_energy(world, state, size) + spring_energy(world, state, count, s, 0.0)) * (
         1.0 + GAIN
@@ -695,8 +739,11 @@ def guard(world, state, size, count, s):
 @kernel
 def remember_points(world, state, r, s):
     """Write what `moved_aside` needs of contact r: both points, Δt J v and the angle of rolling."""
-    work, contacts, i = state.rest_work, state.contacts, state.rest_work.contact[r]
-    x, n = load(contacts.point, i), load(contacts.normal, i)
+    work = state.rest_work
+    contacts = state.contacts
+    i = state.rest_work.contact[r]
+    x = load(contacts.point, i)
+    n = load(contacts.normal, i)
     store(contacts.point_a, i, material_point(state, contacts.body_a[i], x))
     store(contacts.point_b, i, material_point(state, contacts.body_b[i], x))
     _, _, omega_a = twist(world.mechanism, state.body, contacts.body_a[i], state.v)
@@ -712,15 +759,18 @@ def remember_points(world, state, r, s):
 def give_back(world, state, size, count, s):
     """Write the group's velocity to v, and the forces to the contacts and the generalized
     forces."""
-    work, contacts = state.rest_work, state.contacts
-    pushed, rubbed = work.given[:size], work.step[:size]
+    work = state.rest_work
+    contacts = state.contacts
+    pushed = work.given[:size]
+    rubbed = work.step[:size]
     for i in range(size):
         pushed[i] = rubbed[i] = 0.0
         if world.switches.joint_friction:
             rubbed[i] = -dry_impulse(work, i, work.v[i]) / state.h[0]
         state.v[work.dof[i]] = work.v[i]
     for r in range(count):
-        i, force = work.contact[r], (0.0, 0.0, 0.0)
+        i = work.contact[r]
+        force = (0.0, 0.0, 0.0)
         contacts.normal_force[i] = work.p[r * s] / state.h[0]
         contacts.span[i] = state.h[0]
         contacts.expected[i] = contacts.gap[i] + state.h[0] * work.speed[r * s]

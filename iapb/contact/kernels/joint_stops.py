@@ -25,15 +25,18 @@ def is_stop(contacts, i):
 def add_stops(world, state, contacts, count, margin):
     """Append the stops with gap <= margin [m] after `count` contacts; return the new count, −1 if there
     is no room."""
-    stops, w = world.stops, state.body
+    stops = world.stops
+    w = state.body
     for i in range(stops.bound.shape[0]):
         gap = stops.arm[i] * stops.sign[i] * (state.q[stops.coordinate[i]] - stops.bound[i])
         if gap > margin:
             continue
         if count >= contacts.gap.shape[0]:
             return -1
-        k, body = stops.dof[i], stops.body[i]
-        point, normal = load(w.position, body), load(w.axis, k)
+        k = stops.dof[i]
+        body = stops.body[i]
+        point = load(w.position, body)
+        normal = load(w.axis, k)
         if world.mechanism.dof_rotates[k]:
             lever = tangent_of(normal, 0, 2)
             point = add(point, scale(stops.arm[i], lever))
@@ -41,7 +44,9 @@ def add_stops(world, state, contacts, count, margin):
         store(contacts.point, count, point)
         store(contacts.normal, count, scale(stops.sign[i], normal))
         contacts.shape_a[count] = contacts.shape_b[count] = stops.shape[i]
-        contacts.body_a[count], contacts.body_b[count] = body, stops.parent[i]
-        contacts.feature[count], contacts.gap[count] = 0, gap
+        contacts.body_a[count] = body
+        contacts.body_b[count] = stops.parent[i]
+        contacts.feature[count] = 0
+        contacts.gap[count] = gap
         count += 1
     return count

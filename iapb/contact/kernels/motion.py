@@ -121,7 +121,9 @@ def implicit_forces(world, state, touches):
 def drift(world, state, applied):
     """Move all trees freely for h, then apply the second half of gravity to falling trees. False:
     M not definite."""
-    m, free, h = world.mechanism, world.free, state.h[0]
+    m = world.mechanism
+    free = world.free
+    h = state.h[0]
     if not (free.turning and world.switches.velocity_terms):
         integrate(m, state.q, state.v, h, state.q)
     else:
@@ -155,10 +157,13 @@ def coriolis(world, state):
 def swing(world, state, h):
     """Move the linkages by h [s]: velocity Verlet, then the root's momentum and the energy are
     those before."""
-    m, free, a = world.mechanism, world.free, state.acceleration
+    m = world.mechanism
+    free = world.free
+    a = state.acceleration
     for t in range(free.kind.shape[0]):
         if free.kind[t] == LINKAGE:
-            start, stop = world.tree_start[t], world.tree_stop[t]
+            start = world.tree_start[t]
+            stop = world.tree_stop[t]
             p = state.root_momentum[t]
             state.tree_energy[t] = base_momentum(
                 m, free, state.body, state.q, state.mass_matrix, start, stop, t, state.v, p
@@ -171,7 +176,8 @@ def swing(world, state, h):
                 p[6], p[7], p[8] = add(center, path)
     for b in range(m.kind.shape[0]):
         if free.kind[world.tree_of_body[b]] == LINKAGE:
-            start, stop = m.v_start[b], m.v_start[b] + m.v_count[b]
+            start = m.v_start[b]
+            stop = m.v_start[b] + m.v_count[b]
             add_multiple(state.v[start:stop], 0.5 * h, a[start:stop])
             integrate_body(m, b, state.q, state.v, h, state.q)
             add_multiple(state.v[start:stop], 0.5 * h, a[start:stop])
@@ -196,7 +202,8 @@ def swing(world, state, h):
     coriolis(world, state)
     for t in range(free.kind.shape[0]):
         if free.kind[t] == LINKAGE:
-            start, stop = world.tree_start[t], world.tree_stop[t]
+            start = world.tree_start[t]
+            stop = world.tree_stop[t]
             for k in range(start, stop):
                 state.v[k] += 0.5 * h * (a[k] - state.acceleration_before[k])
             p = state.root_momentum[t]
@@ -251,7 +258,8 @@ def add_to_falling_trees(world, state, applied, vector, factor):
     """Do vector += factor · `bias` for the falling trees."""
     for t in range(world.tree_start.shape[0]):
         if falls(world, state, applied, t):
-            start, stop = world.tree_start[t], world.tree_stop[t]
+            start = world.tree_start[t]
+            stop = world.tree_stop[t]
             add_multiple(vector[start:stop], factor, state.bias[start:stop])
 
 
@@ -263,9 +271,13 @@ def damp_joints(world, state):
     v⁺ minimizes ½|v⁺ − v|²_M + ½ h v⁺ᵀ D v⁺, so that ½|v⁺|²_M ≤ ½|v|²_M for every D ≥ 0 and every
     h: the step is passive, and the loss is h v⁺ᵀ D v⁺ + ½|v⁺ − v|²_M.
     """
-    a, mass, lower = state.acceleration, state.work.mass, state.work.lower
+    a = state.acceleration
+    mass = state.work.mass
+    lower = state.work.lower
     for t in range(world.tree_start.shape[0]):
-        start, stop, damped = world.tree_start[t], world.tree_stop[t], False
+        start = world.tree_start[t]
+        stop = world.tree_stop[t]
+        damped = False
         for k in range(start, stop):
             a[k] = 0.0
             damped = damped or world.joint_damping[k] > 0.0
@@ -292,7 +304,8 @@ def accelerate(world, state, applied):
     The forces (4)-(6) act at the contacts of groups that do not collide; in a collision the impulse
     acts.
     """
-    a, contacts = state.acceleration, state.contacts
+    a = state.acceleration
+    contacts = state.contacts
     if not world.switches.implicit_contact:
         for i in range(state.contact_count[0]):
             contacts.normal_force[i] = 0.0

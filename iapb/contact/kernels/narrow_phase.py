@@ -39,8 +39,10 @@ def detect(shapes, pairs, R, p, margin, buffer):
     """
     count = 0
     for k in range(pairs.shape[0]):
-        a, b = pairs[k, 0], pairs[k, 1]
-        kind_a, kind_b = shapes.kind[a], shapes.kind[b]
+        a = pairs[k, 0]
+        b = pairs[k, 1]
+        kind_a = shapes.kind[a]
+        kind_b = shapes.kind[b]
         if kind_a == kind_b and kind_a in (CIRCLE, SPHERE):
             count = balls(shapes, a, b, R, p, margin, buffer, count)
         elif kind_a >= HALF_SPACE:
@@ -72,9 +74,13 @@ def following(shapes, shape, i):
 def vertices_half_plane(shapes, a, b, R, p, margin, buffer, count):
     """Write one contact per vertex of polygon a, or one for circle a: gap = (vertex - point)·normal
     - radius."""
-    (x0, y0), (nx, ny), radius = corner(shapes, b, 0), corner(shapes, b, 1), shapes.radius[a]
+    (x0, y0) = corner(shapes, b, 0)
+    (nx, ny) = corner(shapes, b, 1)
+    radius = shapes.radius[a]
     frame = placement(shapes.body[a], R, p)
-    mx, my = frame[0] * nx + frame[2] * ny, frame[1] * nx + frame[3] * ny  # the normal in a's frame
+    # the normal in a's frame
+    mx = frame[0] * nx + frame[2] * ny
+    my = frame[1] * nx + frame[3] * ny
     offset = (frame[4] - x0) * nx + (frame[5] - y0) * ny - radius
     for i in range(shapes.count[a]):
         x, y = corner(shapes, a, i)
@@ -107,31 +113,38 @@ def circle_polygon(shapes, circle, polygon, circle_is_a, R, p, margin, buffer, c
     """
     x, y = corner(shapes, circle, 0)
     x, y = place(relative_frame(shapes, polygon, circle, R, p), x, y)
-    best, edge, nx, ny = -math.inf, 0, 0.0, 1.0
+    best = -math.inf
+    edge = 0
+    nx = 0.0
+    ny = 1.0
     for i in range(shapes.count[polygon]):
-        (ux, uy), (wx, wy) = (
-            corner(shapes, polygon, i),
-            corner(shapes, polygon, following(shapes, polygon, i)),
-        )
-        ex, ey = wx - ux, wy - uy
+        (ux, uy) = corner(shapes, polygon, i)
+        (wx, wy) = corner(shapes, polygon, following(shapes, polygon, i))
+        ex = wx - ux
+        ey = wy - uy
         length = hypotenuse(ex, ey)
         distance = ((x - ux) * ey - (y - uy) * ex) / length
         if distance > best:
-            best, edge, nx, ny = distance, i, ey / length, -ex / length
+            best = distance
+            edge = i
+            nx = ey / length
+            ny = -ex / length
             if best - shapes.radius[circle] > margin:
                 return count
     feature = vertex_feature(1, 0, edge)
-    (ux, uy), (wx, wy) = (
-        corner(shapes, polygon, edge),
-        corner(shapes, polygon, following(shapes, polygon, edge)),
-    )
-    ex, ey = wx - ux, wy - uy
-    before, beyond = (x - ux) * ex + (y - uy) * ey < 0.0, (x - wx) * ex + (y - wy) * ey > 0.0
+    (ux, uy) = corner(shapes, polygon, edge)
+    (wx, wy) = corner(shapes, polygon, following(shapes, polygon, edge))
+    ex = wx - ux
+    ey = wy - uy
+    before = (x - ux) * ex + (y - uy) * ey < 0.0
+    beyond = (x - wx) * ex + (y - wy) * ey > 0.0
     if best > 0.0 and (before or beyond):  # an end of the edge is nearer
         end = edge if before else following(shapes, polygon, edge)
         ux, uy = corner(shapes, polygon, end)
         best = hypotenuse(x - ux, y - uy)
-        nx, ny, feature = (x - ux) / best, (y - uy) / best, vertex_feature(2, end, 0)
+        nx = (x - ux) / best
+        ny = (y - uy) / best
+        feature = vertex_feature(2, end, 0)
     nx, ny = turn_to_world(nx, ny, shapes.body[polygon], R)
     return ball_on_surface(
         shapes,
@@ -191,20 +204,22 @@ def best_edge(shapes, onto, other, R, p, margin):
     separation of an edge = min over the vertices w of `other` of n·(w - v), n its outward normal, v
     its start
     """
-    frame, best, edge = relative_frame(shapes, onto, other, R, p), -math.inf, 0
+    frame = relative_frame(shapes, onto, other, R, p)
+    best = -math.inf
+    edge = 0
     for i in range(shapes.count[onto]):
         ux, uy, nx, ny, _ = edge_frame(shapes, onto, i)
-        mx, my = (
-            frame[0] * nx + frame[2] * ny,
-            frame[1] * nx + frame[3] * ny,
-        )  # the normal in the other's frame
+        # the normal in the other's frame
+        mx = frame[0] * nx + frame[2] * ny
+        my = frame[1] * nx + frame[3] * ny
         lowest = math.inf
         for k in range(shapes.count[other]):
             x, y = corner(shapes, other, k)
             lowest = min(lowest, mx * x + my * y)
         separation = lowest + nx * (frame[4] - ux) + ny * (frame[5] - uy)
         if separation > best:
-            best, edge = separation, i
+            best = separation
+            edge = i
             if best > margin:
                 return best, edge
     return best, edge
@@ -214,11 +229,10 @@ def best_edge(shapes, onto, other, R, p, margin):
 def edge_frame(shapes, shape, edge):
     """Return start (x, y), outward unit normal (x, y) and length of an edge, in the polygon's
     frame."""
-    (ux, uy), (wx, wy) = (
-        corner(shapes, shape, edge),
-        corner(shapes, shape, following(shapes, shape, edge)),
-    )
-    ex, ey = wx - ux, wy - uy
+    (ux, uy) = corner(shapes, shape, edge)
+    (wx, wy) = corner(shapes, shape, following(shapes, shape, edge))
+    ex = wx - ux
+    ey = wy - uy
     length = math.sqrt(ex * ex + ey * ey)
     return ux, uy, ey / length, -ex / length, length
 
@@ -229,13 +243,17 @@ def _against_reference(shapes, ref, other, edge, separation, ref_is_b, R, p, mar
     closest there."""
     xx, xy, yx, yy, tx, ty = relative_frame(shapes, ref, other, R, p)
     ux, uy, nx, ny, length = edge_frame(shapes, ref, edge)
-    mx, my, incident, opposed = xx * nx + yx * ny, xy * nx + yy * ny, 0, math.inf
+    mx = xx * nx + yx * ny
+    my = xy * nx + yy * ny
+    incident = 0
+    opposed = math.inf
     for i in range(
         shapes.count[other]
     ):  # the incident edge: its outward normal is most opposed to this one's
         _, _, ox, oy, _ = edge_frame(shapes, other, i)
         if ox * mx + oy * my < opposed:
-            incident, opposed = i, ox * mx + oy * my
+            incident = i
+            opposed = ox * mx + oy * my
     from_start = (xx, xy, yx, yy, tx - ux, ty - uy)
     s0, h0 = over_edge(shapes, other, incident, from_start, nx, ny)
     next_incident = following(shapes, other, incident)
@@ -265,7 +283,8 @@ def _against_reference(shapes, ref, other, edge, separation, ref_is_b, R, p, mar
                 if cut
                 else vertex_feature(side, vertex, edge)
             )
-            x, y = ux - ny * s + 0.5 * h * nx, uy + nx * s + 0.5 * h * ny
+            x = ux - ny * s + 0.5 * h * nx
+            y = uy + nx * s + 0.5 * h * ny
             count = _store_from(
                 shapes, ref, other, ref_is_b, feature, x, y, nx, ny, h, R, p, buffer, count
             )
@@ -307,8 +326,13 @@ def _corners(shapes, ref, other, ref_is_b, R, p, margin, buffer, count):
     Pairs of corners are enough: if a corner is closest to the inside of an edge, the best axis is
     the normal of this edge and its separation is already the distance.
     """
-    frame, best, feature = relative_frame(shapes, ref, other, R, p), math.inf, 0
-    vx, vy, wx, wy = 0.0, 0.0, 0.0, 0.0
+    frame = relative_frame(shapes, ref, other, R, p)
+    best = math.inf
+    feature = 0
+    vx = 0.0
+    vy = 0.0
+    wx = 0.0
+    wy = 0.0
     for j in range(shapes.count[other]):
         x, y = corner(shapes, other, j)
         x, y = place(frame, x, y)
@@ -316,7 +340,11 @@ def _corners(shapes, ref, other, ref_is_b, R, p, margin, buffer, count):
             ux, uy = corner(shapes, ref, i)
             square = (x - ux) * (x - ux) + (y - uy) * (y - uy)
             if square < best:
-                best, vx, vy, wx, wy = square, ux, uy, x, y
+                best = square
+                vx = ux
+                vy = uy
+                wx = x
+                wy = y
                 feature = vertex_feature(2, i, j) if ref < other else vertex_feature(2, j, i)
     distance = math.sqrt(best)
     if distance > margin:

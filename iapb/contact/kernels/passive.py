@@ -85,7 +85,9 @@ def wide_gain(mass_matrix, v, w):
     Coq proves it, and that no number overflows, if frexp and ldexp are exact
     (verification/proofs/coq/Wide.v, wide_never_gains_in_binary64).
     """
-    d, top, count = v.shape[0], -100_000, 0
+    d = v.shape[0]
+    top = -100_000
+    count = 0
     high = low = size = 0.0
     for summing in range(2):
         for i in range(d):
@@ -175,7 +177,8 @@ def passive_step(mass_matrix, v, change, alpha, w):
     """
     if _moved(mass_matrix, v, change, alpha, w):
         return alpha
-    longest, step = alpha - least_energy(mass_matrix, v, change), 2.0**-52 * alpha
+    longest = alpha - least_energy(mass_matrix, v, change)
+    step = 2.0**-52 * alpha
     while longest > 0.0:
         step = min(step, longest)
         write_step(v, change, alpha - step, w)
@@ -202,9 +205,13 @@ def _moved(mass_matrix, v, change, alpha, w):
         _, upper, exponent = gain_enclosure(mass_matrix, v, w)
         if upper <= 0.0:
             return True
-        wanted, moved, to, shortest = math.ldexp(0.25 * upper, exponent), -1, 0.0, math.inf
+        wanted = math.ldexp(0.25 * upper, exponent)
+        moved = -1
+        to = 0.0
+        shortest = math.inf
         for i in range(w.shape[0]):
-            slope, mass = 0.0, mass_matrix[i, i]
+            slope = 0.0
+            mass = mass_matrix[i, i]
             for j in range(w.shape[0]):
                 slope += 0.5 * (mass_matrix[i, j] + mass_matrix[j, i]) * w[j]
             place = abs(np.nextafter(w[i], -math.inf if slope > 0.0 else math.inf) - w[i])
@@ -217,11 +224,9 @@ def _moved(mass_matrix, v, change, alpha, w):
             if (abs(slope) - 0.5 * mass * length) * length >= wanted and math.sqrt(
                 mass
             ) * length < shortest:
-                moved, to, shortest = (
-                    i,
-                    w[i] - math.copysign(length, slope),
-                    math.sqrt(mass) * length,
-                )
+                moved = i
+                to = w[i] - math.copysign(length, slope)
+                shortest = math.sqrt(mass) * length
         if moved < 0:
             return False
         w[moved] = to

@@ -43,7 +43,8 @@ _WHOLE = 1.0 - 1e-9
 # Largest difference of the binary exponents of rows with friction that are not scaled.
 _EVEN = 20
 # The p of least norm is corrected until it misses less than this share of Δu, or this many times.
-_MISSED, _CORRECTIONS = 1e-12, 4
+_MISSED = 1e-12
+_CORRECTIONS = 4
 
 # How an impact ends; the last two have no result.
 COMPLETE, BUDGET, CANCELLED, REDUCED, NOT_SOLVED, SCALED, REFUSED, NOT_CONVERGED = range(8)
@@ -98,22 +99,27 @@ def resolve_each(batch, tolerance, budget, clamped):
     tolerance : rank tolerance of the rows; 0 selects the default.
     """
     n, c, d = batch.jacobians.shape
-    masses, jacobians, velocities = batch.masses, batch.jacobians, batch.velocities
-    work, out, rubs = batch.work, batch.out, batch.tangents.shape[0] > 0
-    impact, f, pushes = work.impact, work.friction, batch.unequal.shape[0] > 0
+    masses = batch.masses
+    jacobians = batch.jacobians
+    velocities = batch.velocities
+    work = batch.work
+    out = batch.out
+    rubs = batch.tangents.shape[0] > 0
+    impact = work.impact
+    f = work.friction
+    pushes = batch.unequal.shape[0] > 0
     for m in range(n):
-        v_plus, momentum, p, p_t = (
-            out.velocity[m],
-            out.generalized_impulse[m],
-            out.impulses[m],
-            out.tangential[m],
-        )
+        v_plus = out.velocity[m]
+        momentum = out.generalized_impulse[m]
+        p = out.impulses[m]
+        p_t = out.tangential[m]
         out.numbers[m, 1] = REFUSED
         sound, k = scale_impact(masses[m], jacobians[m], velocities[m], not rubs, work)
         if not sound:
             return m
         whiten_impact(d, c, rubs or pushes, impact)
-        share, status = 1.0, COMPLETE
+        share = 1.0
+        status = COMPLETE
         least = tolerance if tolerance > 0.0 else rank_tolerance(impact.lower)
         if pushes:
             rank, clamp = poisson_impact(
@@ -170,8 +176,10 @@ def resolve_each(batch, tolerance, budget, clamped):
         if clamp == 0.0:
             moving = is_moving(jacobians[m], velocities[m], pushes)
             status = CANCELLED if moving else COMPLETE
-        out.numbers[m, 0], out.numbers[m, 1] = rank, CANCELLED if rounded else status
-        out.numbers[m, 5], out.numbers[m, 6] = clamp, share
+        out.numbers[m, 0] = rank
+        out.numbers[m, 1] = CANCELLED if rounded else status
+        out.numbers[m, 5] = clamp
+        out.numbers[m, 6] = share
     return n
 
 
@@ -183,7 +191,10 @@ def scale_impact(mass_matrix, jacobian, velocity, scales_rows, work):
     scales_rows : False takes r = 0, unless the rows differ in size by more than 2^_EVEN: the
         normal impulses of friction depend on the scale where they are not unique.
     """
-    d, s, r, impact = velocity.shape[0], work.coordinate_exponent, work.row_exponent, work.impact
+    d = velocity.shape[0]
+    s = work.coordinate_exponent
+    r = work.row_exponent
+    impact = work.impact
     for i in range(d):
         if not (
             mass_matrix[i, i] > 0.0
@@ -197,7 +208,8 @@ def scale_impact(mass_matrix, jacobian, velocity, scales_rows, work):
             impact.mass[i, j] = np.ldexp(mass_matrix[i, j], s[i] + s[j])
     for i in range(d):
         for j in range(d):
-            a, b = impact.mass[i, j], impact.mass[j, i]
+            a = impact.mass[i, j]
+            b = impact.mass[j, i]
             if not (abs(a) <= LARGEST_ENTRY and abs(a - b) <= SYMMETRY_TOLERANCE):
                 return False, 0
             impact.lower[i, j] = a if a == b else 0.5 * (a + b)
@@ -209,7 +221,8 @@ def scale_impact(mass_matrix, jacobian, velocity, scales_rows, work):
     k = 0 if k <= _LOWEST_EXPONENT // 2 else k
     for i in range(d):
         impact.v[i] = np.ldexp(velocity[i], -(s[i] + k))
-    longest, shortest = -_LOWEST_EXPONENT, _LOWEST_EXPONENT
+    longest = -_LOWEST_EXPONENT
+    shortest = _LOWEST_EXPONENT
     for i in range(jacobian.shape[0]):
         r[i] = -_LOWEST_EXPONENT  # of a row of zeros
         for j in range(d):
@@ -217,7 +230,8 @@ def scale_impact(mass_matrix, jacobian, velocity, scales_rows, work):
                 return False, 0
             r[i] = min(r[i], -_exponent(jacobian[i, j]) - s[j])
         if r[i] < -_LOWEST_EXPONENT // 2:
-            longest, shortest = min(longest, r[i]), max(shortest, r[i])
+            longest = min(longest, r[i])
+            shortest = max(shortest, r[i])
     for i in range(jacobian.shape[0]):
         if not scales_rows and (shortest - longest <= _EVEN or r[i] > shortest):
             r[i] = 0
@@ -236,7 +250,8 @@ def _exponent(value):
 def separates(jacobian, v, v_plus):
     """Whether no contact closes after Poisson's law, by more than _UNSOLVED of the largest contact
     velocity before, or than the rounding of its own."""
-    largest, separate = 0.0, True
+    largest = 0.0
+    separate = True
     for i in range(jacobian.shape[0]):
         largest = max(largest, abs(dot_of(jacobian[i], v)))
     for i in range(jacobian.shape[0]):
@@ -273,7 +288,10 @@ def least_norm_impulses(d, count, rank, work, impulses):
     If row sizes differ, the p of least norm is computed first. Its rounding leaves a residual of
     Δu, which a p' of least norm then corrects; this second solve does not depend on the row sizes.
     """
-    impact, r, least, even = work.impact, work.row_exponent, -_LOWEST_EXPONENT, True
+    impact = work.impact
+    r = work.row_exponent
+    least = -_LOWEST_EXPONENT
+    even = True
     for i in range(count):
         least = min(least, r[i])
     for i in range(count):
@@ -285,7 +303,8 @@ def least_norm_impulses(d, count, rank, work, impulses):
         return
     for i in range(count):
         impulses[i] *= work.size[i]
-    missed, change = impact.v_change[:d], impact.change[:d]
+    missed = impact.v_change[:d]
+    change = impact.change[:d]
     for turn in range(_CORRECTIONS):
         for k in range(d):
             total = 0.0
@@ -318,7 +337,10 @@ def unscale_impact(
     Writes the energy change, its lower and upper bound, unless v⁺ overflows; returns the factor of
     this clamp, and whether scaling rounded an entry of v that a row or the impact touches.
     """
-    d, s, factor, impact = velocity.shape[0], work.coordinate_exponent, 1.0, work.impact
+    d = velocity.shape[0]
+    s = work.coordinate_exponent
+    factor = 1.0
+    impact = work.impact
     rounded = False
     for i in range(d):
         touched = impact.v_plus[i] != impact.v[i]
@@ -347,9 +369,12 @@ def unscale_impact(
                 scaled[i] *= factor
         lower, upper, exponent = gain_enclosure(mass_matrix, velocity, v_plus)
     change = np.ldexp(kinetic_energies(impact.mass, impact.v, impact.v_plus)[1], 2 * k)
-    low, high = _outward(lower, exponent - 2, -math.inf), _outward(upper, exponent - 2, math.inf)
+    low = _outward(lower, exponent - 2, -math.inf)
+    high = _outward(upper, exponent - 2, math.inf)
     change = low if low > change else change
-    numbers[2], numbers[3], numbers[4] = high if high < change else change, low, high
+    numbers[2] = high if high < change else change
+    numbers[3] = low
+    numbers[4] = high
     return factor, rounded
 
 

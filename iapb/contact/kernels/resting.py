@@ -46,7 +46,8 @@ def resting_force(world, state, contacts, i):
         contacts.gap[i], contacts.normal_velocity[i], world.stiffness, world.damping, world.clamped
     )
     contacts.normal_force[i] = force
-    x, n = load(contacts.point, i), load(contacts.normal, i)
+    x = load(contacts.point, i)
+    n = load(contacts.normal, i)
     add_body_row(world.mechanism, state.body, contacts.body_a[i], x, n, force, state.penalty_force)
     add_body_row(world.mechanism, state.body, contacts.body_b[i], x, n, -force, state.penalty_force)
     friction = friction_of(world, contacts, i)

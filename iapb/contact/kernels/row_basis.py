@@ -28,7 +28,9 @@ _NOISE = 1e-15
 def _most_violating(closing, size, count, eligible_above):
     """Return the pivot: the eligible, long enough residual row with the largest |rᵢ·u| / ‖rᵢ‖; −1
     if none."""
-    best, best_speed, longest = -1, -1.0, 0.0
+    best = -1
+    best_speed = -1.0
+    longest = 0.0
     for i in range(count):
         longest = max(longest, size[i])
     shortest = max(eligible_above, _PIVOT_SHARE * _PIVOT_SHARE * longest)
@@ -36,7 +38,8 @@ def _most_violating(closing, size, count, eligible_above):
         if size[i] > shortest:
             speed = abs(closing[i]) / math.sqrt(size[i])
             if speed > best_speed:
-                best, best_speed = i, speed
+                best = i
+                best_speed = speed
     return best
 
 
@@ -71,13 +74,11 @@ def orthonormal_basis(d, count, tolerance, budget, work):
     A residual row is eligible only above `tolerance` × its unit row. At most `budget` rows are
     used; every truncation is passive. Rows 0 … rank − 1 of work.basis are the result.
     """
-    columns, u, closing, size, overlap = (
-        work.columns[:d],
-        work.u[:d],
-        work.closing,
-        work.size,
-        work.overlap,
-    )
+    columns = work.columns[:d]
+    u = work.u[:d]
+    closing = work.closing
+    size = work.size
+    overlap = work.overlap
     closing[:count] = 0.0
     size[:count] = 0.0
     for k in range(d):
@@ -128,7 +129,8 @@ def minimum_norm_impulses(d, count, rank, length, change, impulses, work):
 def minimum_norm_factors(d, count, rank, length, work):
     """Factor B = V T: write Vᵀ to work.columns, T to work.triangle; a direction that no row reaches
     becomes zero."""
-    tall, triangle = work.columns, work.triangle
+    tall = work.columns
+    triangle = work.triangle
     for j in range(rank):
         for i in range(count):
             total = 0.0

@@ -34,7 +34,8 @@ def add_body_row(m, w, body, x, n, factor, out, shift=0):
         return
     k = m.last_dof[body]
     while k >= 0:
-        j, square = load(w.axis, k), 1.0
+        j = load(w.axis, k)
+        square = 1.0
         if m.dof_rotates[k]:
             o = load(w.position, m.dof_body[k])
             j = cross(j, subtract(x, o))
@@ -66,7 +67,9 @@ def direction_row(m, w, contacts, i, direction, out):
 def write_pair_row(world, state, trees, i, direction, out):
     """Write the row along a direction at contact i to out (2 w,): w entries for each of its two
     trees (−1 = none)."""
-    half, x, factor = out.shape[0] // 2, load(state.contacts.point, i), 1.0
+    half = out.shape[0] // 2
+    x = load(state.contacts.point, i)
+    factor = 1.0
     out[:] = 0.0
     for body in (state.contacts.body_a[i], state.contacts.body_b[i]):
         if body >= 0:
@@ -90,7 +93,9 @@ def tangent_of(n, which, tangents):
     of two."""
     if tangents == 1:
         return (-n[1], n[0], 0.0)
-    ax, ay, az = abs(n[0]), abs(n[1]), abs(n[2])
+    ax = abs(n[0])
+    ay = abs(n[1])
+    az = abs(n[2])
     if ax <= ay and ax <= az:  # x × n, of the axis that is farthest from n
         first = (0.0, -n[2], n[1])
     elif ay <= az:
@@ -127,7 +132,9 @@ def twist(m, w, body, v):
 def contact_velocities(m, w, v, contacts, count):
     """Write normal_velocity n·(v_a − v_b) and tangential_velocity (the rest of v_a − v_b) of each
     contact."""
-    points, normals, tangentials = contacts.point, contacts.normal, contacts.tangential_velocity
+    points = contacts.point
+    normals = contacts.normal
+    tangentials = contacts.tangential_velocity
     a = b = -1  # bodies whose twists are computed already: contacts of one pair follow each other
     p_a, u_a, omega_a = p_b, u_b, omega_b = twist(m, w, -1, v)
     for i in range(count):
@@ -137,7 +144,8 @@ def contact_velocities(m, w, v, contacts, count):
         if contacts.body_b[i] != b:
             b = contacts.body_b[i]
             p_b, u_b, omega_b = twist(m, w, b, v)
-        x, n = load(points, i), load(normals, i)
+        x = load(points, i)
+        n = load(normals, i)
         relative = add(u_a, cross(omega_a, subtract(x, p_a)))
         if b >= 0:
             relative = subtract(relative, add(u_b, cross(omega_b, subtract(x, p_b))))

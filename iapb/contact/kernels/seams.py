@@ -23,9 +23,12 @@ _SAME_NORMAL = 1.0 - 5e-7  # cosine of 1e-3 rad: such a contact carries the body
 def leave_out_seams(world, state, contacts, count):
     """Drop new contacts of pairs that the sag of a resting contact explains; return how many
     contacts stay."""
-    kept, i = 0, 0
+    kept = 0
+    i = 0
     while i < count:
-        stop, strikes, old = i, False, False
+        stop = i
+        strikes = False
+        old = False
         while (
             stop < count
             and contacts.shape_a[stop] == contacts.shape_a[i]
@@ -54,7 +57,8 @@ def explained(world, state, contacts, i, count):
     another contact of the same two bodies."""
     n = load(contacts.normal, i)
     for j in range(count):
-        normal, sag = load(contacts.normal, j), 0.0
+        normal = load(contacts.normal, j)
+        sag = 0.0
         if is_stop(contacts, j) or dot(n, normal) > _SAME_NORMAL:
             continue
         for k in range(count):  # the deepest contact of this surface
@@ -84,7 +88,8 @@ def explained(world, state, contacts, i, count):
 @kernel
 def joins(contacts, i, body, other):
     """Whether contact i is one of these two bodies: walls that join are all the world."""
-    a, b = contacts.body_a[i], contacts.body_b[i]
+    a = contacts.body_a[i]
+    b = contacts.body_b[i]
     return (a == body and b == other) or (a == other and b == body)
 
 

@@ -34,7 +34,8 @@ def relative_frame(shapes, onto, other, R, p):
     """Return the planar placement (see `placement`) of the body of `other` in that of `onto`."""
     ixx, ixy, iyx, iyy, ix, iy = placement(shapes.body[onto], R, p)
     jxx, jxy, jyx, jyy, jx, jy = placement(shapes.body[other], R, p)
-    dx, dy = jx - ix, jy - iy
+    dx = jx - ix
+    dy = jy - iy
     return (
         ixx * jxx + iyx * jyx,
         ixx * jxy + iyx * jyy,
@@ -62,14 +63,16 @@ def turn_to_world(x, y, body, R):
 @kernel
 def world_center(shapes, shape, R, p):
     """Return, in the world, the centre of a circle, sphere or box, or the point of a half-space."""
-    body, local = shapes.body[shape], load(shapes.center, shape)
+    body = shapes.body[shape]
+    local = load(shapes.center, shape)
     return local if body < 0 else add(load(p, body), transform(R, body, local))
 
 
 @kernel
 def world_axis(shapes, shape, k, R):
     """Return axis k of a shape in the world; axis 2 of a half-space is its outward normal."""
-    body, local = shapes.body[shape], column(shapes.axes, shape, k)
+    body = shapes.body[shape]
+    local = column(shapes.axes, shape, k)
     return local if body < 0 else transform(R, body, local)
 
 
@@ -92,7 +95,9 @@ def balls(shapes, a, b, R, p, margin, buffer, count):
     """
     center = world_center(shapes, b, R, p)
     apart = subtract(world_center(shapes, a, R, p), center)
-    radius_a, radius_b, flat = shapes.radius[a], shapes.radius[b], shapes.kind[a] == CIRCLE
+    radius_a = shapes.radius[a]
+    radius_b = shapes.radius[b]
+    flat = shapes.kind[a] == CIRCLE
     if max(abs(apart[0]), abs(apart[1])) > radius_a + radius_b + margin:
         return count
     distance = hypotenuse(apart[0], apart[1]) if flat else math.sqrt(dot(apart, apart))
@@ -129,12 +134,12 @@ def store_contact(shapes, one, other, one_is_a, feature, point, normal, gap, buf
     a, b = (one, other) if one_is_a else (other, one)
     if not one_is_a:
         normal = (-normal[0], -normal[1], -normal[2] if shapes.kind[a] >= HALF_SPACE else 0.0)
-    buffer.shape_a[count], buffer.shape_b[count], buffer.feature[count] = a, b, feature
-    buffer.body_a[count], buffer.body_b[count], buffer.gap[count] = (
-        shapes.body[a],
-        shapes.body[b],
-        gap,
-    )
+    buffer.shape_a[count] = a
+    buffer.shape_b[count] = b
+    buffer.feature[count] = feature
+    buffer.body_a[count] = shapes.body[a]
+    buffer.body_b[count] = shapes.body[b]
+    buffer.gap[count] = gap
     store(buffer.point, count, point)
     store(buffer.normal, count, normal)
     return count + 1
@@ -143,12 +148,12 @@ def store_contact(shapes, one, other, one_is_a, feature, point, normal, gap, buf
 @kernel
 def copy_contact(to, i, contacts, j):
     """Copy the geometry of contact j to row i of the buffer `to`."""
-    to.shape_a[i], to.shape_b[i], to.feature[i] = (
-        contacts.shape_a[j],
-        contacts.shape_b[j],
-        contacts.feature[j],
-    )
-    to.body_a[i], to.body_b[i], to.gap[i] = contacts.body_a[j], contacts.body_b[j], contacts.gap[j]
+    to.shape_a[i] = contacts.shape_a[j]
+    to.shape_b[i] = contacts.shape_b[j]
+    to.feature[i] = contacts.feature[j]
+    to.body_a[i] = contacts.body_a[j]
+    to.body_b[i] = contacts.body_b[j]
+    to.gap[i] = contacts.gap[j]
     store(to.point, i, load(contacts.point, j))
     store(to.normal, i, load(contacts.normal, j))
 
@@ -157,8 +162,10 @@ def copy_contact(to, i, contacts, j):
 def copy_found(to, i, contacts, j):
     """Copy contact j, its velocities and whether it is new to row i of the buffer `to`."""
     copy_contact(to, i, contacts, j)
-    to.is_new[i], to.idle[i] = contacts.is_new[j], contacts.idle[j]
-    to.normal_velocity[i], to.lift[i] = contacts.normal_velocity[j], 0.0
+    to.is_new[i] = contacts.is_new[j]
+    to.idle[i] = contacts.idle[j]
+    to.normal_velocity[i] = contacts.normal_velocity[j]
+    to.lift[i] = 0.0
     store(to.tangential_velocity, i, load(contacts.tangential_velocity, j))
 
 
@@ -166,13 +173,13 @@ def copy_found(to, i, contacts, j):
 def copy_all(to, i, contacts, j):
     """Copy contact j with all that a step computes of it to row i of the buffer `to`."""
     copy_found(to, i, contacts, j)
-    to.collides[i], to.mark[i], to.sticks[i] = (
-        contacts.collides[j],
-        contacts.mark[j],
-        contacts.sticks[j],
-    )
-    to.normal_force[i], to.expected[i] = contacts.normal_force[j], contacts.expected[j]
-    to.span[i], to.lift[i] = contacts.span[j], contacts.lift[j]
+    to.collides[i] = contacts.collides[j]
+    to.mark[i] = contacts.mark[j]
+    to.sticks[i] = contacts.sticks[j]
+    to.normal_force[i] = contacts.normal_force[j]
+    to.expected[i] = contacts.expected[j]
+    to.span[i] = contacts.span[j]
+    to.lift[i] = contacts.lift[j]
     store(to.friction_force, i, load(contacts.friction_force, j))
     store(to.point_a, i, load(contacts.point_a, j))
     store(to.point_b, i, load(contacts.point_b, j))

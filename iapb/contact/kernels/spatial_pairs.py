@@ -39,21 +39,21 @@ def spatial_pair(shapes, a, b, R, p, margin, buffer, count):
 def corners_half_space(shapes, a, b, R, p, margin, buffer, count):
     """Write one contact per corner of box a, or one for sphere a: gap = (corner - point)·normal -
     radius."""
-    normal, center, radius = (
-        world_axis(shapes, b, 2, R),
-        world_center(shapes, a, R, p),
-        shapes.radius[a],
-    )
+    normal = world_axis(shapes, b, 2, R)
+    center = world_center(shapes, a, R, p)
+    radius = shapes.radius[a]
     height = dot(subtract(center, world_center(shapes, b, R, p)), normal)
     x, y, z = world_axes(shapes, a, R)
-    x, y, z = (
-        scale(shapes.half_size[a, 0], x),
-        scale(shapes.half_size[a, 1], y),
-        scale(shapes.half_size[a, 2], z),
-    )
-    over_x, over_y, over_z = dot(x, normal), dot(y, normal), dot(z, normal)
+    x = scale(shapes.half_size[a, 0], x)
+    y = scale(shapes.half_size[a, 1], y)
+    z = scale(shapes.half_size[a, 2], z)
+    over_x = dot(x, normal)
+    over_y = dot(y, normal)
+    over_z = dot(z, normal)
     for corner in range(8 if shapes.kind[a] == BOX else 1):
-        sx, sy, sz = 1.0 - 2.0 * (corner & 1), 1.0 - (corner & 2), 1.0 - 0.5 * (corner & 4)
+        sx = 1.0 - 2.0 * (corner & 1)
+        sy = 1.0 - (corner & 2)
+        sz = 1.0 - 0.5 * (corner & 4)
         gap = height + (sx * over_x + (sy * over_y + sz * over_z)) - radius
         if gap <= margin:
             arm = add(scale(sx, x), add(scale(sy, y), scale(sz, z)))
@@ -69,25 +69,33 @@ def sphere_box(shapes, sphere, box, sphere_is_a, R, p, margin, buffer, count):
     """Write the contact of a sphere and a box, at the box's nearest point, or nearest face for a
     centre inside."""
     center = world_center(shapes, sphere, R, p)
-    apart, half = subtract(center, world_center(shapes, box, R, p)), load(shapes.half_size, box)
+    apart = subtract(center, world_center(shapes, box, R, p))
+    half = load(shapes.half_size, box)
     reach = half[0] + half[1] + half[2] + shapes.radius[sphere] + margin
     if dot(apart, apart) > reach * reach:
         return count
     axes = world_axes(shapes, box, R)
-    region, outward = 0, (0.0, 0.0, 0.0)
-    exit_distance, exit_region, exit_normal = math.inf, 0, (0.0, 0.0, 1.0)
+    region = 0
+    outward = (0.0, 0.0, 0.0)
+    exit_distance = math.inf
+    exit_region = 0
+    exit_normal = (0.0, 0.0, 1.0)
     for k in range(3):
         x = dot(apart, axes[k])
-        beyond, sign = abs(x) - half[k], 1.0 if x >= 0.0 else -1.0
+        beyond = abs(x) - half[k]
+        sign = 1.0 if x >= 0.0 else -1.0
         if beyond > 0.0:
             region += (1 if x > 0.0 else 2) * 3**k
             outward = add(outward, scale(sign * beyond, axes[k]))
         if -beyond < exit_distance:
-            exit_distance, exit_region = -beyond, (1 if x >= 0.0 else 2) * 3**k
+            exit_distance = -beyond
+            exit_region = (1 if x >= 0.0 else 2) * 3**k
             exit_normal = scale(sign, axes[k])
     distance = math.sqrt(dot(outward, outward))
     if distance == 0.0:  # the centre is inside
-        distance, region, normal = -exit_distance, exit_region, exit_normal
+        distance = -exit_distance
+        region = exit_region
+        normal = exit_normal
     else:
         normal = (outward[0] / distance, outward[1] / distance, outward[2] / distance)
     return ball_on_surface(
@@ -129,7 +137,8 @@ ROUNDING_SHARE = 1e-12
 # A face of b that is parallel to a's decides only if it overlaps less by this share of the boxes'
 # size: two faces that rest on each other keep one normal, and the same points, while the boxes
 # settle.
-FACE_SHARE, FACES_COSINE = 1e-4, 0.9999
+FACE_SHARE = 1e-4
+FACES_COSINE = 0.9999
 
 
 @kernel
@@ -145,8 +154,11 @@ def placed_box(shapes, shape, R, p):
 @kernel
 def boxes(shapes, a, b, R, p, margin, buffer, count):
     """Write the contacts (four at most) of two boxes."""
-    A, B = placed_box(shapes, a, R, p), placed_box(shapes, b, R, p)
-    apart, half_a, half_b = subtract(A[0], B[0]), A[2], B[2]
+    A = placed_box(shapes, a, R, p)
+    B = placed_box(shapes, b, R, p)
+    apart = subtract(A[0], B[0])
+    half_a = A[2]
+    half_b = B[2]
     size = half_a[0] + half_a[1] + half_a[2] + half_b[0] + half_b[1] + half_b[2]
     if dot(apart, apart) > (size + margin) * (size + margin):
         return count
@@ -182,18 +194,25 @@ def _best_face(apart, A, B, bias):
     Along a face of b that is parallel to a's, the separation must exceed that along a's by the bias
     [m].
     """
-    face, of_a, best = 0, True, -math.inf
+    face = 0
+    of_a = True
+    best = -math.inf
     for k in range(3):
         separation = abs(dot(apart, A[1][k])) - A[2][k] - _reach(B, A[1][k])
         if separation > best:
-            face, of_a, best = k, True, separation
-    most, first = best, face
+            face = k
+            of_a = True
+            best = separation
+    most = best
+    first = face
     for k in range(3):
         separation = abs(dot(apart, B[1][k])) - B[2][k] - _reach(A, B[1][k])
         most = max(most, separation)
         lead = bias if of_a and abs(dot(A[1][first], B[1][k])) > FACES_COSINE else 0.0
         if separation > best + lead:
-            face, of_a, best = k, False, separation
+            face = k
+            of_a = False
+            best = separation
     return face, of_a, best, most
 
 
@@ -201,7 +220,9 @@ def _best_face(apart, A, B, bias):
 def _best_edges(apart, A, B):
     """Return the edge directions i of a and j of b of largest separation on their common normal,
     and the separation."""
-    best_i, best_j, best = 0, 0, -math.inf
+    best_i = 0
+    best_j = 0
+    best = -math.inf
     for i in range(3):
         for j in range(3):
             n = cross(A[1][i], B[1][j])
@@ -211,7 +232,9 @@ def _best_edges(apart, A, B):
             n = scale(1.0 / length, n)
             separation = abs(dot(apart, n)) - _reach(A, n) - _reach(B, n)
             if separation > best:
-                best_i, best_j, best = i, j, separation
+                best_i = i
+                best_j = j
+                best = separation
     return best_i, best_j, best
 
 
@@ -219,7 +242,8 @@ def _best_edges(apart, A, B):
 def _edge_middle(box, k, n):
     """Return the middle of the edge along axis k that lies farthest in direction n, and its feature
     number."""
-    (point, axes, half), number = box, 0
+    (point, axes, half) = box
+    number = 0
     for other in range(3):
         if other != k:
             positive = dot(axes[other], n) > 0.0
@@ -231,7 +255,8 @@ def _edge_middle(box, k, n):
 @kernel
 def _edges(shapes, a, b, i, j, gap, A, B, buffer, count):
     """Write one contact midway between the closest points of two edges."""
-    along, across = A[1][i], B[1][j]
+    along = A[1][i]
+    across = B[1][j]
     n = cross(along, across)
     n = scale(1.0 / math.sqrt(dot(n, n)), n)
     if dot(n, subtract(A[0], B[0])) < 0.0:
@@ -240,12 +265,15 @@ def _edges(shapes, a, b, i, j, gap, A, B, buffer, count):
     y, edge_b = _edge_middle(B, j, n)
     # closest points x + s a_i, y + t b_j of two lines: (x - y + s a_i - t b_j) is orthogonal to a_i
     # and b_j
-    cosine, between = dot(along, across), subtract(x, y)
-    along_a, along_b = dot(between, along), dot(between, across)
+    cosine = dot(along, across)
+    between = subtract(x, y)
+    along_a = dot(between, along)
+    along_b = dot(between, across)
     sine_square = 1.0 - cosine * cosine
     s = (cosine * along_b - along_a) / sine_square
     t = (along_b - cosine * along_a) / sine_square
-    s, t = min(max(s, -A[2][i]), A[2][i]), min(max(t, -B[2][j]), B[2][j])
+    s = min(max(s, -A[2][i]), A[2][i])
+    t = min(max(t, -B[2][j]), B[2][j])
     point = scale(0.5, add(add(x, scale(s, along)), add(y, scale(t, across))))
     return store_contact(
         shapes, a, b, True, vertex_feature(5, edge_a, edge_b), point, n, gap, buffer, count
@@ -265,31 +293,34 @@ def clip_faces(
 ):
     """Write the contacts over the reference face `face` of box `ref`; its outward normal m points
     to the other box."""
-    (center, axes, half), (center_other, axes_other, half_other) = box, box_other
+    (center, axes, half) = box
+    (center_other, axes_other, half_other) = box_other
     apart = subtract(center_other, center)
     sign = 1.0 if dot(apart, axes[face]) >= 0.0 else -1.0
-    u, v, m = axes[(face + 1) % 3], axes[(face + 2) % 3], scale(sign, axes[face])
+    u = axes[(face + 1) % 3]
+    v = axes[(face + 2) % 3]
+    m = scale(sign, axes[face])
     sides = (half[(face + 1) % 3], half[(face + 2) % 3])
-    incident, opposed = 0, 0.0
+    incident = 0
+    opposed = 0.0
     for k in range(3):
         if abs(dot(axes_other[k], m)) > abs(opposed):
-            incident, opposed = k, dot(axes_other[k], m)
+            incident = k
+            opposed = dot(axes_other[k], m)
     side = -1.0 if opposed > 0.0 else 1.0
-    k1, k2 = (incident + 1) % 3, (incident + 2) % 3
+    k1 = (incident + 1) % 3
+    k2 = (incident + 2) % 3
     middle = add(apart, scale(side * half_other[incident], axes_other[incident]))
-    first, second = scale(half_other[k1], axes_other[k1]), scale(half_other[k2], axes_other[k2])
+    first = scale(half_other[k1], axes_other[k1])
+    second = scale(half_other[k2], axes_other[k2])
     c = (dot(middle, u), dot(middle, v), dot(middle, m) - half[face])
-    e1, e2 = (
-        (dot(first, u), dot(first, v), dot(first, m)),
-        (dot(second, u), dot(second, v), dot(second, m)),
-    )
+    e1 = (dot(first, u), dot(first, v), dot(first, m))
+    e2 = (dot(second, u), dot(second, v), dot(second, m))
     faces = (2 * face + (1 if sign > 0.0 else 0)) * 6 + 2 * incident + (1 if side > 0.0 else 0)
-    origin, kind, start, deepest = (
-        add(center, scale(half[face], m)),
-        3 if ref_is_a else 4,
-        count,
-        (0.0, 0.0, 1e300),
-    )
+    origin = add(center, scale(half[face], m))
+    kind = 3 if ref_is_a else 4
+    start = count
+    deepest = (0.0, 0.0, 1e300)
     near = ALIGNED * (sides[0] + sides[1] + _extent(e1) + _extent(e2))
     for number in range(25):
         inside, corner = _corner_of_overlap(number, c, e1, e2, sides, near)
@@ -298,7 +329,9 @@ def clip_faces(
         if (
             number == 24
         ):  # no overlap seen along the normal, or rounding at a corner: take the deepest corner
-            inside, x, y = count == start, deepest[0], deepest[1]
+            inside = count == start
+            x = deepest[0]
+            y = deepest[1]
             corner = (
                 min(max(x, -sides[0]), sides[0]),
                 min(max(y, -sides[1]), sides[1]),
@@ -331,20 +364,23 @@ def _corner_of_overlap(number, c, e1, e2, sides, near):
     it where edges are aligned, is a corner once: an incident one if it can be, else a reference
     one. Faces that coincide thus give four points.
     """
-    first, second = 1.0 - 2.0 * (number & 1), 1.0 - (number & 2)
+    first = 1.0 - 2.0 * (number & 1)
+    second = 1.0 - (number & 2)
     if number < 4:
         corner = add(add(c, scale(first, e1)), scale(second, e2))
         return abs(corner[0]) <= sides[0] + 4.0 * near and abs(corner[1]) <= sides[
             1
         ] + 4.0 * near, corner
     if number < 8:
-        x, y = first * sides[0], second * sides[1]
+        x = first * sides[0]
+        y = second * sides[1]
         area = e1[0] * e2[1] - e1[1] * e2[0]
         if area == 0.0:
             return False, c
         alpha = ((x - c[0]) * e2[1] - (y - c[1]) * e2[0]) / area
         beta = (e1[0] * (y - c[1]) - e1[1] * (x - c[0])) / area
-        beyond, over = (abs(alpha) - 1.0) * _extent(e1), (abs(beta) - 1.0) * _extent(e2)
+        beyond = (abs(alpha) - 1.0) * _extent(e1)
+        over = (abs(beta) - 1.0) * _extent(e2)
         inside = max(beyond, over) <= 2.0 * near and min(beyond, over) < -2.0 * near
         return inside, (x, y, c[2] + alpha * e1[2] + beta * e2[2])
     # the edge c + first·e1 + β e2, β in (-1, 1), or c + first·e2 + α e1
@@ -352,8 +388,10 @@ def _corner_of_overlap(number, c, e1, e2, sides, near):
     k = 0 if number & 8 else 1  # with the side x = ± sides[0] of the rectangle, or y = ± sides[1]
     if abs(e[k]) <= near:
         return False, c
-    t, along = (second * sides[k] - start[k]) / e[k], second * sides[k]
-    across, h = start[1 - k] + t * e[1 - k], start[2] + t * e[2]
+    t = (second * sides[k] - start[k]) / e[k]
+    along = second * sides[k]
+    across = start[1 - k] + t * e[1 - k]
+    h = start[2] + t * e[2]
     crosses = (abs(t) - 1.0) * _extent(e) < -near and abs(across) < sides[1 - k] - near
     return crosses, (along, across, h) if k == 0 else (across, along, h)
 
@@ -378,19 +416,24 @@ def keep_widest(buffer, start, count, m):
         if buffer.gap[i] < buffer.gap[chosen]:
             chosen = i
     _swap(buffer, start, chosen, count)
-    x, chosen, best = load(buffer.point, start), start + 1, -1.0
+    x = load(buffer.point, start)
+    chosen = start + 1
+    best = -1.0
     for i in range(start + 1, count):
         arm = subtract(load(buffer.point, i), x)
         if dot(arm, arm) > best:
-            chosen, best = i, dot(arm, arm)
+            chosen = i
+            best = dot(arm, arm)
     _swap(buffer, start + 1, chosen, count)
     line = cross(m, subtract(load(buffer.point, start + 1), x))
     for rank, side in ((start + 2, 1.0), (start + 3, -1.0)):
-        chosen, best = rank, -1.0e300
+        chosen = rank
+        best = -1.0e300
         for i in range(rank, count):
             reach = side * dot(line, subtract(load(buffer.point, i), x))
             if reach > best:
-                chosen, best = i, reach
+                chosen = i
+                best = reach
         _swap(buffer, rank, chosen, count)
     return start + BOX_PAIR_CONTACTS
 

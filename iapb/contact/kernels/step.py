@@ -20,7 +20,8 @@ def advance(world, state, applied):
     """Advance (q, v) by one step under the generalized force `applied` (d,); return a status."""
     for k in range(state.v.shape[0]):  # forces and impulses of the step before
         state.penalty_force[k] = state.friction_force[k] = state.impulse[k] = 0.0
-    state.impacts.logged[0], state.h[0] = 0, world.dt
+    state.impacts.logged[0] = 0
+    state.h[0] = world.dt
     if not locate(world, state):
         return NOT_POSITIVE_DEFINITE
     if world.switches.contacts:

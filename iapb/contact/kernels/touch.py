@@ -105,7 +105,8 @@ def arrives(world, state, i):
 @kernel
 def is_whole(world, state, body, other):
     """Return whether one of two bodies is in the group that is never cut."""
-    whole, group = state.cut.whole[0], state.group_of_tree
+    whole = state.cut.whole[0]
+    group = state.group_of_tree
     if whole < 0:
         return False
     if group[world.tree_of_body[body]] == group[whole]:
@@ -116,7 +117,9 @@ def is_whole(world, state, body, other):
 @kernel
 def deepest_of_groups(world, state, i):
     """Return the deepest overlap [m] in the groups of the two bodies of contact i of `arriving`."""
-    found, now, deepest = state.arriving, state.contacts, 0.0
+    found = state.arriving
+    now = state.contacts
+    deepest = 0.0
     one = state.group_of_tree[world.tree_of_body[found.body_a[i]]]
     other = one
     if found.body_b[i] >= 0:
@@ -131,7 +134,8 @@ def deepest_of_groups(world, state, i):
 @kernel
 def met_before(state, i):
     """Return whether the two bodies of contact i of `arriving` have been in contact already."""
-    found, now = state.arriving, state.contacts
+    found = state.arriving
+    now = state.contacts
     for k in range(state.contact_count[0]):
         acts = now.gap[k] < -TOUCHING or now.normal_force[k] > 0.0
         if (
@@ -147,9 +151,11 @@ def met_before(state, i):
 @kernel
 def gather_components(world, state, count):
     """Write the components of groups that new contacts link; return whether there are any."""
-    cut, some = state.cut, False
+    cut = state.cut
+    some = False
     for t in range(cut.component.shape[0]):
-        cut.component[t], cut.touches[t] = state.group_of_tree[t], False
+        cut.component[t] = state.group_of_tree[t]
+        cut.touches[t] = False
     for i in range(count):
         if arrives(world, state, i):
             link(world, state, state.arriving.body_a[i], state.arriving.body_b[i])
@@ -164,8 +170,13 @@ def find_fast_pairs(world, state):
 
     Their relative way exceeds half of the thinner one, and they are no farther apart than this way.
     """
-    cut, sweep, shapes, count = state.cut, world.sweep, world.shapes, 0
-    cut.fast_count[0], quick, fastest = 0, False, 0.0
+    cut = state.cut
+    sweep = world.sweep
+    shapes = world.shapes
+    count = 0
+    cut.fast_count[0] = 0
+    quick = False
+    fastest = 0.0
     for k in range(state.v.shape[0]):
         fastest = max(fastest, abs(state.v[k]))
     if world.dt * fastest * sweep.lever <= 0.5 * sweep.thinnest:
@@ -173,7 +184,8 @@ def find_fast_pairs(world, state):
     for i in range(shapes.kind.shape[0]):
         quick = quick or way_of(world, state, i) > 0.5 * sweep.thinnest
     for k in range(world.pairs.shape[0] if quick else 0):
-        a, b = world.pairs[k, 0], world.pairs[k, 1]
+        a = world.pairs[k, 0]
+        b = world.pairs[k, 1]
         way = way_of(world, state, a) + way_of(world, state, b)
         if not way > 0.5 * min(sweep.thin[a], sweep.thin[b]):
             continue
@@ -192,7 +204,8 @@ def find_fast_pairs(world, state):
 @kernel
 def middle_of(world, state, i):
     """Return the middle of shape i in the world."""
-    body, middle = world.shapes.body[i], load(world.sweep.middle, i)
+    body = world.shapes.body[i]
+    middle = load(world.sweep.middle, i)
     if body < 0:
         return middle
     return add(load(state.body.position, body), transform(state.body.rotation, body, middle))
@@ -225,7 +238,8 @@ def link(world, state, body, other):
 @kernel
 def keep_start(state):
     """Keep the start of the step, after its impacts, and the end of the whole step."""
-    cut, counts = state.cut, state.contact_count
+    cut = state.cut
+    counts = state.contact_count
     copy_into(cut.v, state.start_v)
     copy_into(cut.impulse, state.impulse)
     copy_into(cut.contact_impulse, state.contact_impulse)
@@ -237,7 +251,9 @@ def keep_start(state):
     copy_into(cut.end_v, state.v)
     copy_into(cut.end_penalty, state.penalty_force)
     copy_into(cut.end_friction, state.friction_force)
-    cut.numbers[0], cut.numbers[1], cut.numbers[2] = counts[0], counts[1], state.impacts.logged[0]
+    cut.numbers[0] = counts[0]
+    cut.numbers[1] = counts[1]
+    cut.numbers[2] = state.impacts.logged[0]
     for i in range(counts[0]):
         copy_all(cut.contacts, i, state.contacts, i)
     for i in range(counts[1]):
@@ -254,7 +270,8 @@ def back_to_start(state):
     copy_into(state.state_of_tree, cut.state)
     copy_into(state.spreading, cut.spreading)
     copy_into(state.rests, cut.rests)
-    state.contact_count[0], state.impacts.logged[0] = cut.numbers[0], cut.numbers[2]
+    state.contact_count[0] = cut.numbers[0]
+    state.impacts.logged[0] = cut.numbers[2]
     for t in range(cut.struck.shape[0]):
         cut.struck[t] = state.state_of_tree[t] == COLLIDING
     for i in range(cut.numbers[0]):
@@ -264,7 +281,9 @@ def back_to_start(state):
 @kernel
 def cut_component(world, state, applied, root):
     """Do the step of one component in parts; return a status."""
-    cut, left, parts = state.cut, world.dt, 0
+    cut = state.cut
+    left = world.dt
+    parts = 0
     size = begin_component(world, state, root)
     while True:
         status = move_part(world, state, applied, left)
@@ -316,7 +335,8 @@ def cut_component(world, state, applied, root):
 @kernel
 def begin_component(world, state, root):
     """Choose the trees that move and the contacts that take part; return the number of trees."""
-    cut, size = state.cut, 0
+    cut = state.cut
+    size = 0
     for t in range(state.moving.shape[0]):
         state.moving[t] = cut.component[t] == root
         size += state.moving[t]
@@ -335,7 +355,8 @@ def begin_component(world, state, root):
 @kernel
 def takes_part(world, state, contacts, i):
     """Return whether both bodies of a contact move now; the world takes part in everything."""
-    a, b = world.tree_of_body[contacts.body_a[i]], contacts.body_b[i]
+    a = world.tree_of_body[contacts.body_a[i]]
+    b = contacts.body_b[i]
     return state.moving[a] and (b < 0 or state.moving[world.tree_of_body[b]])
 
 
@@ -368,7 +389,9 @@ def move_part(world, state, applied, h):
 def reached(world, state):
     """Return whether the component has new contacts at the end of the step, and whether with a tree
     outside, which then is linked to it."""
-    some, found, count = False, state.arriving, contacts_at_end(world, state)
+    some = False
+    found = state.arriving
+    count = contacts_at_end(world, state)
     for i in range(count):
         b = found.body_b[i]
         inside = state.moving[world.tree_of_body[found.body_a[i]]]
@@ -385,9 +408,12 @@ def reached(world, state):
 def move_to_overlap(world, state, applied, left):
     """Move the component to the first moment of the `left` seconds that finds a fast pair in
     overlap, or to their end; return the moment and a status."""
-    cut, samples, status = state.cut, 1.0, OK
+    cut = state.cut
+    samples = 1.0
+    status = OK
     for j in range(cut.fast_count[0]):
-        a, b = world.pairs[cut.fast[j], 0], world.pairs[cut.fast[j], 1]
+        a = world.pairs[cut.fast[j], 0]
+        b = world.pairs[cut.fast[j], 1]
         if state.moving[world.tree_of_body[world.shapes.body[a]]]:
             way = way_of(world, state, a) + way_of(world, state, b)
             thin = min(world.sweep.thin[a], world.sweep.thin[b])
@@ -400,9 +426,11 @@ def move_to_overlap(world, state, applied, left):
             return h, status
         forward_kinematics(world.mechanism, state.q, state.body)
         for j in range(cut.fast_count[0]):
-            a, b = world.pairs[cut.fast[j], 0], world.pairs[cut.fast[j], 1]
+            a = world.pairs[cut.fast[j], 0]
+            b = world.pairs[cut.fast[j], 1]
             if state.moving[world.tree_of_body[world.shapes.body[a]]]:
-                cut.pairs[0, 0], cut.pairs[0, 1] = a, b
+                cut.pairs[0, 0] = a
+                cut.pairs[0, 1] = b
                 if overlaps_now(world, state):
                     return h, OK
     return left, move_part(world, state, applied, left)
@@ -411,7 +439,9 @@ def move_to_overlap(world, state, applied, left):
 @kernel
 def overlaps_now(world, state):
     """Return whether a new contact of the first of the listed pairs overlaps."""
-    found, count, overlaps = state.arriving, gaps_of_pairs(world, state, 1), False
+    found = state.arriving
+    count = gaps_of_pairs(world, state, 1)
+    overlaps = False
     velocities_and_marks(world, state, count)
     for i in range(count):
         overlaps = overlaps or found.gap[i] < -CLOSE and found.is_new[i]
@@ -437,7 +467,8 @@ def move_to_touch(world, state, applied, left):
     """Move the component to its first touch in the `left` seconds at whose end bodies overlap;
     return after how long it comes, and a status."""
     pairs, stops = pairs_that_touch(world, state)
-    low, high = 0.0, left
+    low = 0.0
+    high = left
     _, _, guess = next_touch(world, state, pairs, stops, left)
     expected = math.inf  # when the touch comes, as seen from `low`
     for turn in range(SEARCHES):
@@ -466,7 +497,10 @@ def move_to_touch(world, state, applied, left):
 def pairs_that_touch(world, state):
     """Write the pairs of shapes of new contacts that take part; return their number, and whether
     ends of joints are among them."""
-    found, pairs, count, stops = state.arriving, state.cut.pairs, 0, False
+    found = state.arriving
+    pairs = state.cut.pairs
+    count = 0
+    stops = False
     for i in range(contacts_at_end(world, state)):
         if not (takes_part(world, state, found, i) and arrives(world, state, i)):
             continue
@@ -477,7 +511,8 @@ def pairs_that_touch(world, state):
         for k in range(count):
             known = known or pairs[k, 0] == found.shape_a[i] and pairs[k, 1] == found.shape_b[i]
         if not known:
-            pairs[count, 0], pairs[count, 1] = found.shape_a[i], found.shape_b[i]
+            pairs[count, 0] = found.shape_a[i]
+            pairs[count, 1] = found.shape_b[i]
             count += 1
     return count, stops
 
@@ -494,20 +529,26 @@ def next_touch(world, state, pairs, stops, h):
     if stops:
         count = add_stops(world, state, found, count, math.inf)
     velocities_and_marks(world, state, count)
-    overlaps, touches, earlier, later = False, False, math.inf, math.inf
+    overlaps = False
+    touches = False
+    earlier = math.inf
+    later = math.inf
     for i in range(count):
         if not found.is_new[i] or not takes_part(world, state, found, i):
             continue
-        gap, speed = found.gap[i], found.normal_velocity[i]
+        gap = found.gap[i]
+        speed = found.normal_velocity[i]
         if met_before(state, i):
             gap += CLOSE
         x, y, z = load(found.point, i)
         rounded = TOUCHING * (1.0 + abs(x) + abs(y) + abs(z))
         when = h - gap / speed if speed < 0.0 else math.inf
         if gap < -rounded:
-            overlaps, earlier = True, min(earlier, when)
+            overlaps = True
+            earlier = min(earlier, when)
         else:
-            touches, later = touches or gap <= rounded and speed < 0.0, min(later, when)
+            touches = touches or gap <= rounded and speed < 0.0
+            later = min(later, when)
     return overlaps, touches, earlier if overlaps else later
 
 
@@ -518,18 +559,22 @@ def lifts(world, state):
     A corner about which a body turns moves off its support on its arc. The step before would show
     how far, but there was no contact.
     """
-    now, found, some = state.contacts, state.arriving, False
+    now = state.contacts
+    found = state.arriving
+    some = False
     for i in range(state.contact_count[0]):
         if now.idle[i] or now.mark[i] == LEFT or now.normal_force[i] <= 0.0 or is_stop(now, i):
             continue
         before = contact_before(state, i, 0)
         if before >= 0 and state.previous.normal_force[before] > 0.0:
             continue
-        state.cut.pairs[0, 0], state.cut.pairs[0, 1] = now.shape_a[i], now.shape_b[i]
+        state.cut.pairs[0, 0] = now.shape_a[i]
+        state.cut.pairs[0, 1] = now.shape_b[i]
         count = gaps_of_pairs(world, state, 1)
         for k in range(count):
             if same_name(found, k, now, i) and found.gap[k] > CLOSE:
-                now.lift[i], some = found.gap[k], True
+                now.lift[i] = found.gap[k]
+                some = True
     return some
 
 
@@ -561,8 +606,12 @@ def take_contacts(world, state):
     Contacts of other components stay, and those that have struck and are apart now: the record shows
     their impulses.
     """
-    now, before, found, kept = state.contacts, state.previous, state.arriving, 0
-    count, found_count = state.contact_count[0], contacts_at_end(world, state)
+    now = state.contacts
+    before = state.previous
+    found = state.arriving
+    kept = 0
+    count = state.contact_count[0]
+    found_count = contacts_at_end(world, state)
     if found_count < 0:
         return False
     for i in range(count):
@@ -582,7 +631,9 @@ def take_contacts(world, state):
             room -= 1
         copy_all(now, kept, before, i)
         if not before.idle[i]:
-            now.gap[kept], now.normal_force[kept], now.idle[kept] = 0.0, 0.0, True
+            now.gap[kept] = 0.0
+            now.normal_force[kept] = 0.0
+            now.idle[kept] = True
             store(now.friction_force, kept, (0.0, 0.0, 0.0))
         state.contact_impulse[kept] = state.row_impulse[i]
         kept += 1
@@ -593,7 +644,9 @@ def take_contacts(world, state):
         if kept == now.gap.shape[0]:
             return False
         copy_found(now, kept, found, i)
-        now.mark[kept], now.normal_force[kept], state.contact_impulse[kept] = 0, 0.0, 0.0
+        now.mark[kept] = 0
+        now.normal_force[kept] = 0.0
+        state.contact_impulse[kept] = 0.0
         store(now.friction_force, kept, (0.0, 0.0, 0.0))
         state.contact_count[0] = kept + 1
         old = contact_before(state, kept, begin)
@@ -631,12 +684,10 @@ def strike(world, state, flies):
 @kernel
 def let_go(world, state):
     """Take contacts that an impact has separated out of the forces of the rest of the step."""
-    contacts, now, count, some = (
-        state.contacts,
-        state.scratch_contacts,
-        state.contact_count[0],
-        False,
-    )
+    contacts = state.contacts
+    now = state.scratch_contacts
+    count = state.contact_count[0]
+    some = False
     for t in range(state.moving.shape[0]):
         collides = state.moving[t] and state.state_of_tree[t] == COLLIDING
         some = some or collides
@@ -647,7 +698,8 @@ def let_go(world, state):
         copy_contact(now, i, contacts, i)
     contact_velocities(world.mechanism, state.body, state.v, now, count)
     for i in range(count):
-        a, b = world.tree_of_body[contacts.body_a[i]], contacts.body_b[i]
+        a = world.tree_of_body[contacts.body_a[i]]
+        b = contacts.body_b[i]
         if contacts.idle[i] or state.state_of_tree[a] != COLLIDING:
             continue
         if now.normal_velocity[i] > world.approach_velocity and contacts.gap[i] >= -CLOSE:

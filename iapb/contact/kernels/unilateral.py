@@ -63,7 +63,9 @@ def push_only(rows, count, b, p, residual, work):
     rows : (d, ≥count) unit rows of A as columns; p : (≥count,); residual : (d,); work : a
         `PushWork`.
     """
-    d, size, known = b.shape[0], 0, 0
+    d = b.shape[0]
+    size = 0
+    known = 0
     terms = work.terms[:d]
     copy_into(residual, b)
     for k in range(d):
@@ -72,12 +74,14 @@ def push_only(rows, count, b, p, residual, work):
     work.held[:count] = False
     work.banned[:count] = False
     for _ in range(10 * (count + d) + 10):
-        entering, speed = -1, 0.0
+        entering = -1
+        speed = 0.0
         for i in range(count):
             if not (work.held[i] or work.banned[i]):
                 closing = dot_of(rows[:, i], residual)
                 if closing < speed and closing < -_CLOSING * d * _size_of(rows[:, i], terms):
-                    entering, speed = i, closing
+                    entering = i
+                    speed = closing
         if entering < 0:
             for j in range(size):
                 moving = dot_of(work.q[j], residual)
@@ -93,7 +97,8 @@ def push_only(rows, count, b, p, residual, work):
         work.held[entering] = True
         size, known = _retreat(rows, b, size + 1, p, work)
         for k in range(d):
-            residual[k], terms[k] = b[k], work.earlier[k] + abs(b[k])
+            residual[k] = b[k]
+            terms[k] = work.earlier[k] + abs(b[k])
             for j in range(size):
                 entry = rows[k, work.passive[j]]
                 residual[k] += entry * p[work.passive[j]]
@@ -119,7 +124,9 @@ def _size_of(row, terms):
 def _solve_passive(rows, b, known, size, work):
     """Solve least squares on the passive rows, with `known` directions given; return how many are
     independent."""
-    q, triangle, solution = work.q, work.triangle, work.solution
+    q = work.q
+    triangle = work.triangle
+    solution = work.solution
     for j in range(known, size):
         copy_into(q[j, : b.shape[0]], rows[:, work.passive[j]])
         square = orthogonalize(q[j, : b.shape[0]], q, j, triangle[:, j])
@@ -140,16 +147,19 @@ def _solve_passive(rows, b, known, size, work):
 def _retreat(rows, b, size, p, work):
     """Move p towards the passive solution and release rows that would pull; return the number of
     passive rows, and how many of their directions are known."""
-    passive, solution = work.passive, work.solution
+    passive = work.passive
+    solution = work.solution
     while True:
-        step, blocking = 1.0, -1
+        step = 1.0
+        blocking = -1
         for j in range(size):
             if solution[j] <= 0.0:
                 ratio = (
                     p[passive[j]] / (p[passive[j]] - solution[j]) if p[passive[j]] > 0.0 else 0.0
                 )
                 if ratio < step or blocking < 0:
-                    step, blocking = ratio, j
+                    step = ratio
+                    blocking = j
         for j in range(size):
             p[passive[j]] += step * (solution[j] - p[passive[j]])
         if blocking < 0:
@@ -175,19 +185,27 @@ def share_compression(d, count, restitution, tolerance, compressed, impulses, wo
     With the projector Π on {x : Aᵀx = 0} and p₀ = p_c − Πp_c, the least is p₀ + Πs with 0 ≤ s ⟂
     p₀ + Πs ≥ 0. `push_only` finds 0 ≤ w ⟂ Πw + ρ p₀ ≥ 0, ρ = 1 + p₀·w/|p_c|² ≥ ½, and s = w/ρ.
     """
-    rows, tight, kinds, lowest, highest = work.rows, push.banned, 0.0, 1.0, 0.0
+    rows = work.rows
+    tight = push.banned
+    kinds = 0.0
+    lowest = 1.0
+    highest = 0.0
     for i in range(count):  # by complementarity p_c = 0 at every contact that separates
         speed = dot_of(rows[:, i], compressed)
         rounding = _TOUCHING * _size_of(rows[:, i], push.terms[:d])
         tight[i] = work.length[i] > 0.0 and speed <= rounding
         if tight[i]:
-            lowest, highest = min(lowest, restitution[i]), max(highest, restitution[i])
+            lowest = min(lowest, restitution[i])
+            highest = max(highest, restitution[i])
         for k in range(d):
             work.columns[k, i] = rows[k, i] if tight[i] else 0.0
     if lowest >= highest:
         return
     rank = orthonormal_basis(d, count, tolerance, d, work)
-    shared, left, tall, weight = share.shared[:count], share.slack[:count], share.tall, share.weight
+    shared = share.shared[:count]
+    left = share.slack[:count]
+    tall = share.tall
+    weight = share.weight
     for i in range(count):
         equal = 0
         for j in range(count):
@@ -202,7 +220,8 @@ def share_compression(d, count, restitution, tolerance, compressed, impulses, wo
     if norm == 0.0 or kinds < rank + 0.5:
         return
     minimum_norm_factors(d, count, rank, weight, work)
-    aim, residual = share.aim[: count + 1], share.residual[: count + 1]
+    aim = share.aim[: count + 1]
+    residual = share.residual[: count + 1]
     orthogonalize(left, work.columns, rank, aim)
     for i in range(count):
         shared[i] -= left[i]
@@ -232,11 +251,11 @@ def poisson_impact(d, count, restitution, tolerance, clamped, work, push, share,
     (number of rows that push, clamp). If the active-set method does not converge, it returns (−1,
     1) and v⁺ is not written.
     """
-    rows, u = work.rows, work.u[:d]
-    compressed, final = (
-        work.deviation[:d],
-        work.along[:d],
-    )  # whitened velocities after compression and after restitution
+    rows = work.rows
+    u = work.u[:d]
+    # whitened velocities after compression and after restitution
+    compressed = work.deviation[:d]
+    final = work.along[:d]
     if not push_only(rows, count, u, impulses, compressed, push):
         return -1, 1.0
     copy_into(push.earlier[:d], push.terms[:d])
@@ -255,7 +274,8 @@ def poisson_impact(d, count, restitution, tolerance, clamped, work, push, share,
     for k in range(d):
         work.change[k] = final[k] - u[k]
     write_change(d, work)
-    clamp, pushing = apply_change(d, clamped, work), 0
+    clamp = apply_change(d, clamped, work)
+    pushing = 0
     for i in range(count):
         impulses[i] += push.more[i]
         pushing += impulses[i] > 0.0

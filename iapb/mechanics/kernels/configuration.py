@@ -32,7 +32,8 @@ def turn_quaternion(q, i, phi, out):
     sin, t = sine_cosine(0.5 * angle)
     factor = 0.5 - angle * angle / 48.0 if angle < SMALL_ANGLE else sin / angle
     b = scale(factor, phi)
-    a, s = (q[i], q[i + 1], q[i + 2]), q[i + 3]
+    a = (q[i], q[i + 1], q[i + 2])
+    s = q[i + 3]
     vector = add(add(scale(s, b), scale(t, a)), cross(a, b))
     scalar = s * t - dot(a, b)
     length = sqrt(dot(vector, vector) + scalar * scalar)
@@ -49,7 +50,8 @@ def integrate_in_space(m, b, q, v, dt, out):
 
     u = v_linear dt, phi = v_angular dt, t = |phi|, A = (1 - cos t) / t^2, B = (t - sin t) / t^3.
     """
-    i, k = m.q_start[b], m.v_start[b]
+    i = m.q_start[b]
+    k = m.v_start[b]
     if m.kind[b] == SPHERICAL:
         turn_quaternion(q, i, (v[k] * dt, v[k + 1] * dt, v[k + 2] * dt), out)
         return
@@ -58,14 +60,19 @@ def integrate_in_space(m, b, q, v, dt, out):
     angle = sqrt(dot(phi, phi))
     square = angle * angle
     if angle < SMALL_ANGLE:
-        first, second = 0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0
+        first = 0.5 - square / 24.0
+        second = 1.0 / 6.0 - square / 120.0
     else:
-        half, whole = sine_cosine(0.5 * angle)[0], sine_cosine(angle)[0]
-        first, second = 2.0 * half * half / square, (angle - whole) / (square * angle)
+        half = sine_cosine(0.5 * angle)[0]
+        whole = sine_cosine(angle)[0]
+        first = 2.0 * half * half / square
+        second = (angle - whole) / (square * angle)
     turned = cross(phi, u)
     path = add(u, add(scale(first, turned), scale(second, cross(phi, turned))))
     path = turn_vector(q[i + 3], q[i + 4], q[i + 5], q[i + 6], path)
-    out[i], out[i + 1], out[i + 2] = q[i] + path[0], q[i + 1] + path[1], q[i + 2] + path[2]
+    out[i] = q[i] + path[0]
+    out[i + 1] = q[i + 1] + path[1]
+    out[i + 2] = q[i + 2] + path[2]
     turn_quaternion(q, i + 3, phi, out)
 
 
@@ -78,7 +85,8 @@ def is_vector(kind):
 @kernel
 def own_count(m, b):
     """Return the number of a joint's own velocities: none if it follows another joint."""
-    k, count = m.v_start[b], m.v_count[b]
+    k = m.v_start[b]
+    count = m.v_count[b]
     return count if count == 0 or m.dof_leader[k] == k else 0
 
 
@@ -86,12 +94,16 @@ def own_count(m, b):
 def integrate_body(m, b, q, v, dt, out):
     """Coordinates of body b in out (nq,) <- those in q moved for dt with the constant velocity
     v."""
-    kind, i, k = m.kind[b], m.q_start[b], m.v_start[b]
+    kind = m.kind[b]
+    i = m.q_start[b]
+    k = m.v_start[b]
     if kind == CONTINUOUS:
         sin, cos = sine_cosine(v[k] * dt)
-        c, s = q[i] * cos - q[i + 1] * sin, q[i + 1] * cos + q[i] * sin
+        c = q[i] * cos - q[i + 1] * sin
+        s = q[i + 1] * cos + q[i] * sin
         length = sqrt(c * c + s * s)
-        out[i], out[i + 1] = c / length, s / length
+        out[i] = c / length
+        out[i + 1] = s / length
     elif kind in (SPHERICAL, FREE_FLYER):
         integrate_in_space(m, b, q, v, dt, out)
     else:
@@ -110,12 +122,15 @@ def integrate(m, q, v, dt, out):
 def quaternion_difference(q0, q1, i):
     """Return the rotation vector phi, in the body axes of q0, with q1 = q0 * exp(phi / 2) and |phi|
     <= pi."""
-    a, s = (-q0[i], -q0[i + 1], -q0[i + 2]), q0[i + 3]
-    b, t = (q1[i], q1[i + 1], q1[i + 2]), q1[i + 3]
+    a = (-q0[i], -q0[i + 1], -q0[i + 2])
+    s = q0[i + 3]
+    b = (q1[i], q1[i + 1], q1[i + 2])
+    t = q1[i + 3]
     vector = add(add(scale(s, b), scale(t, a)), cross(a, b))
     scalar = s * t - dot(a, b)
     if scalar < 0.0:  # q and -q are the same rotation: take the shorter way
-        vector, scalar = scale(-1.0, vector), -scalar
+        vector = scale(-1.0, vector)
+        scalar = -scalar
     length = sqrt(dot(vector, vector))
     factor = 2.0 if length == 0.0 else 2.0 * arc_tangent(length, scalar) / length
     return scale(factor, vector)
@@ -128,7 +143,8 @@ def difference_in_space(m, b, q0, q1, out):
     A free flyer's u solves (1 + A [phi]x + B [phi]x^2) u = path: u = path - phi x path / 2 + C phi
     x (phi x path).
     """
-    i, k = m.q_start[b], m.v_start[b]
+    i = m.q_start[b]
+    k = m.v_start[b]
     if m.kind[b] == SPHERICAL:
         out[k], out[k + 1], out[k + 2] = quaternion_difference(q0, q1, i)
         return
@@ -152,7 +168,9 @@ def difference_in_space(m, b, q0, q1, out):
 def difference(m, q0, q1, out):
     """out (d,) <- the v with integrate(q0, v, 1) = q1, by the shortest rotations."""
     for b in range(m.kind.shape[0]):
-        kind, i, k = m.kind[b], m.q_start[b], m.v_start[b]
+        kind = m.kind[b]
+        i = m.q_start[b]
+        k = m.v_start[b]
         if kind == CONTINUOUS:
             out[k] = arc_tangent(
                 q0[i] * q1[i + 1] - q0[i + 1] * q1[i], q0[i] * q1[i] + q0[i + 1] * q1[i + 1]

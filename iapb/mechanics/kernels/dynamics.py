@@ -38,14 +38,18 @@ def composite_bodies(m, w):
         w.composite_mass[b] = m.mass[b]
         store(w.composite_center, b, load(w.center, b))
         rotation = w.rotation[b]  # the inertia in world axes is R I R^T
-        x, y, z = load(rotation, 0), load(rotation, 1), load(rotation, 2)
-        image_x, image_y, image_z = (
-            transform(m.inertia, b, x),
-            transform(m.inertia, b, y),
-            transform(m.inertia, b, z),
-        )
-        xx, yy, zz = dot(x, image_x), dot(y, image_y), dot(z, image_z)
-        xy, xz, yz = dot(x, image_y), dot(x, image_z), dot(y, image_z)
+        x = load(rotation, 0)
+        y = load(rotation, 1)
+        z = load(rotation, 2)
+        image_x = transform(m.inertia, b, x)
+        image_y = transform(m.inertia, b, y)
+        image_z = transform(m.inertia, b, z)
+        xx = dot(x, image_x)
+        yy = dot(y, image_y)
+        zz = dot(z, image_z)
+        xy = dot(x, image_y)
+        xz = dot(x, image_z)
+        yz = dot(y, image_z)
         own = w.composite_inertia[b]
         store(own, 0, (xx, xy, xz))
         store(own, 1, (xy, yy, yz))
@@ -53,18 +57,19 @@ def composite_bodies(m, w):
     for b in range(m.kind.shape[0] - 1, -1, -1):
         into = m.parent[b]
         if into >= 0:
-            m1, m2 = w.composite_mass[into], w.composite_mass[b]
+            m1 = w.composite_mass[into]
+            m2 = w.composite_mass[b]
             total = m1 + m2
             center = load(w.composite_center, into)
             r = subtract(load(w.composite_center, b), center)
             share = m2 / total if total > 0.0 else 0.0
-            mu, square, inertia, own = (
-                m1 * share,
-                dot(r, r),
-                w.composite_inertia[into],
-                w.composite_inertia[b],
-            )
-            xy, xz, yz = -mu * (r[0] * r[1]), -mu * (r[0] * r[2]), -mu * (r[1] * r[2])
+            mu = m1 * share
+            square = dot(r, r)
+            inertia = w.composite_inertia[into]
+            own = w.composite_inertia[b]
+            xy = -mu * (r[0] * r[1])
+            xz = -mu * (r[0] * r[2])
+            yz = -mu * (r[1] * r[2])
             accumulate(inertia, 0, add(load(own, 0), (mu * (square - r[0] * r[0]), xy, xz)))
             accumulate(inertia, 1, add(load(own, 1), (xy, mu * (square - r[1] * r[1]), yz)))
             accumulate(inertia, 2, add(load(own, 2), (xz, yz, mu * (square - r[2] * r[2]))))
@@ -85,7 +90,8 @@ def mass_matrix(m, w, out):
     alone = m.dof_body.shape[0] == out.shape[0]
     for j in range(m.dof_body.shape[0]):
         b = m.dof_body[j]
-        a, c = load(w.axis, j), load(w.composite_center, b)
+        a = load(w.axis, j)
+        c = load(w.composite_center, b)
         if m.dof_rotates[j]:
             linear = scale(w.composite_mass[b], cross(a, subtract(c, load(w.position, b))))
             angular = transform(w.composite_inertia, b, a)
@@ -110,7 +116,8 @@ def mass_matrix(m, w, out):
 @kernel
 def add_to_leaders(m, i, j, entry, out):
     """Add an entry of two motions to that of the velocities which they follow: Gᵀ M G."""
-    k, l = m.dof_leader[i], m.dof_leader[j]
+    k = m.dof_leader[i]
+    l = m.dof_leader[j]
     share = m.dof_ratio[i] * m.dof_ratio[j] * entry
     out[k, l] += share
     if i != j:
@@ -134,7 +141,8 @@ def project_forces(m, w, out):
     """Sum forces and moments (about body origins) from the leaves inwards; out (d,) <- their dof
     components."""
     for b in range(m.kind.shape[0] - 1, -1, -1):
-        f, n = load(w.force, b), load(w.moment, b)
+        f = load(w.force, b)
+        n = load(w.moment, b)
         for k in range(m.v_start[b], m.v_start[b] + m.v_count[b]):
             if m.dof_leader[k] == k:
                 out[k] = dot(load(w.axis, k), n if m.dof_rotates[k] else f)
@@ -153,7 +161,8 @@ def project_forces(m, w, out):
 def relative_motion(m, w, b, rates):
     """Return linear and angular part of the joint's motion, in world axes, for the given rates of
     its dofs."""
-    linear, angular = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    linear = (0.0, 0.0, 0.0)
+    angular = (0.0, 0.0, 0.0)
     for k in range(m.v_start[b], m.v_start[b] + m.v_count[b]):
         rate = m.dof_ratio[k] * rates[m.dof_leader[k]]
         if m.dof_rotates[k]:
@@ -191,30 +200,30 @@ def inverse_dynamics(m, w, v, dv, g, out):
     for b in range(m.kind.shape[0]):
         parent = m.parent[b]
         u, s = relative_motion(m, w, b, v)
-        omega, alpha, a = s, (0.0, 0.0, 0.0), (0.0 - g[0], 0.0 - g[1], 0.0 - g[2])
+        omega = s
+        alpha = (0.0, 0.0, 0.0)
+        a = (0.0 - g[0], 0.0 - g[1], 0.0 - g[2])
         if parent >= 0:
-            carried, carried_alpha = (
-                load(w.angular_velocity, parent),
-                load(w.angular_acceleration, parent),
-            )
+            carried = load(w.angular_velocity, parent)
+            carried_alpha = load(w.angular_acceleration, parent)
             r = subtract(load(w.position, b), load(w.position, parent))
-            omega, alpha = add(carried, s), add(carried_alpha, cross(carried, s))
+            omega = add(carried, s)
+            alpha = add(carried_alpha, cross(carried, s))
             a = add(load(w.linear_acceleration, parent), cross(carried_alpha, r))
             a = add(a, cross(carried, add(cross(carried, r), scale(2.0, u))))
         if m.kind[b] == FREE_FLYER:
             a = add(a, cross(s, u))
         if dv.shape[0] > 0:
             changed_u, changed_s = relative_motion(m, w, b, dv)
-            alpha, a = add(alpha, changed_s), add(a, changed_u)
+            alpha = add(alpha, changed_s)
+            a = add(a, changed_u)
         store(w.angular_velocity, b, omega)
         store(w.angular_acceleration, b, alpha)
         store(w.linear_acceleration, b, a)
         r = subtract(load(w.center, b), load(w.position, b))
         f = scale(m.mass[b], add(a, add(cross(alpha, r), cross(omega, cross(omega, r)))))
-        own_omega, own_alpha = (
-            transform_back(w.rotation, b, omega),
-            transform_back(w.rotation, b, alpha),
-        )
+        own_omega = transform_back(w.rotation, b, omega)
+        own_alpha = transform_back(w.rotation, b, alpha)
         h = transform(m.inertia, b, own_omega)
         n = transform(w.rotation, b, add(transform(m.inertia, b, own_alpha), cross(own_omega, h)))
         store(w.force, b, f)

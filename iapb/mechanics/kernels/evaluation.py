@@ -104,7 +104,8 @@ def energies_along(m, w, q, v, g, kinetic, potential):
         body_velocities(m, w, v[k])
         kinetic[k] = potential[k] = 0.0
         for b in range(m.kind.shape[0]):
-            u, omega = center_velocity(w, b), load(w.angular_velocity, b)
+            u = center_velocity(w, b)
+            omega = load(w.angular_velocity, b)
             kinetic[k] += 0.5 * (m.mass[b] * dot(u, u) + dot(omega, turned_inertia(m, w, b, omega)))
             if m.last_dof[b] >= 0:
                 potential[k] -= m.mass[b] * dot((g[0], g[1], g[2]), load(w.center, b))
@@ -115,7 +116,10 @@ def centroidal_momentum(m, w, v, out):
     """out (6,) <- linear momentum [N s] and angular momentum [N m s] about the moving bodies'
     centre of mass."""
     body_velocities(m, w, v)
-    mass, first_moment, linear, angular = 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    mass = 0.0
+    first_moment = (0.0, 0.0, 0.0)
+    linear = (0.0, 0.0, 0.0)
+    angular = (0.0, 0.0, 0.0)
     for b in range(m.kind.shape[0]):
         if m.last_dof[b] >= 0:
             mass += m.mass[b]
@@ -149,7 +153,8 @@ def poses_along(m, w, q, out):
     for k in range(q.shape[0]):
         forward_kinematics(m, q[k], w)
         for b in range(out.shape[1]):
-            out[k, b, 0], out[k, b, 1] = w.position[b, 0], w.position[b, 1]
+            out[k, b, 0] = w.position[b, 0]
+            out[k, b, 1] = w.position[b, 1]
             if out.shape[2] == 3:
                 out[k, b, 2] = arc_tangent(w.rotation[b, 1, 0], w.rotation[b, 0, 0])
             else:
@@ -163,24 +168,21 @@ def write_quaternion(r, q):
     cancellation."""
     trace = r[0, 0] + r[1, 1] + r[2, 2]
     i = 0 if r[0, 0] >= r[1, 1] and r[0, 0] >= r[2, 2] else 1 if r[1, 1] >= r[2, 2] else 2
-    j, k = (i + 1) % 3, (i + 2) % 3
+    j = (i + 1) % 3
+    k = (i + 2) % 3
     if trace > r[i, i]:
         s = 2.0 * sqrt(1.0 + trace)
-        q[i], q[j], q[k], q[3] = (
-            (r[k, j] - r[j, k]) / s,
-            (r[i, k] - r[k, i]) / s,
-            (r[j, i] - r[i, j]) / s,
-            0.25 * s,
-        )
+        q[i] = (r[k, j] - r[j, k]) / s
+        q[j] = (r[i, k] - r[k, i]) / s
+        q[k] = (r[j, i] - r[i, j]) / s
+        q[3] = 0.25 * s
     else:
         s = 2.0 * sqrt(1.0 + r[i, i] - r[min(j, k), min(j, k)] - r[max(j, k), max(j, k)])
         s = s if r[k, j] >= r[j, k] else -s
-        q[i], q[j], q[k], q[3] = (
-            0.25 * s,
-            (r[i, j] + r[j, i]) / s,
-            (r[i, k] + r[k, i]) / s,
-            (r[k, j] - r[j, k]) / s,
-        )
+        q[i] = 0.25 * s
+        q[j] = (r[i, j] + r[j, i]) / s
+        q[k] = (r[i, k] + r[k, i]) / s
+        q[3] = (r[k, j] - r[j, k]) / s
 
 
 @kernel
@@ -195,8 +197,11 @@ def displacements_along(m, q, straight, out):
         difference(m, q[k], q[k + 1], out[k])
         for b in range(m.kind.shape[0]):
             if straight and m.kind[b] == FREE_FLYER:
-                i, j, c = m.q_start[b], m.v_start[b], load(m.center_of_mass, b)
-                now, then = q[k, i : i + 7], q[k + 1, i : i + 7]
+                i = m.q_start[b]
+                j = m.v_start[b]
+                c = load(m.center_of_mass, b)
+                now = q[k, i : i + 7]
+                then = q[k + 1, i : i + 7]
                 path = (then[0] - now[0], then[1] - now[1], then[2] - now[2])
                 path = add(path, turn_vector(then[3], then[4], then[5], then[6], c))
                 path = subtract(turn_vector(-now[3], -now[4], -now[5], now[6], path), c)

@@ -44,7 +44,9 @@ from iapb.numerics.linalg import (
 STRAIGHT, RIGID, LINKAGE = range(3)
 # rad in a step: below the first, one turn of second order is exact to rounding; beyond the others,
 # several parts
-SLOW_ANGLE, RIGID_ANGLE, LINKAGE_ANGLE = 1e-4, 0.1, 0.02
+SLOW_ANGLE = 1e-4
+RIGID_ANGLE = 0.1
+LINKAGE_ANGLE = 0.02
 MOST_PARTS = 100
 YOSHIDA = 1.3512071919596578  # 1/(2 − 2^(1/3)), twice a step, with 1 − 2 × it in between
 # largest factor on the rates of joints; a larger one would mean that the step is far too long
@@ -70,13 +72,17 @@ class FreeMotion(NamedTuple):
 def turn_freely(free, t, q, i, v, k, dt):
     """Turn the quaternion at q[i] and the spin at v[k] of the RIGID tree t for dt [s]; R l stays as
     it is."""
-    axes, I = free.axes, (free.moments[t, 0], free.moments[t, 1], free.moments[t, 2])
+    axes = free.axes
+    I = (free.moments[t, 0], free.moments[t, 1], free.moments[t, 2])
     omega = transform(axes, t, (v[k], v[k + 1], v[k + 2]))
-    l0, l1, l2 = I[0] * omega[0], I[1] * omega[1], I[2] * omega[2]
+    l0 = I[0] * omega[0]
+    l1 = I[1] * omega[1]
+    l2 = I[2] * omega[2]
     turn_quaternion(
         q, i, transform_back(axes, t, (dt * l0 / I[1], dt * l1 / I[1], dt * l2 / I[1])), q
     )
-    first, third = 1.0 / I[0] - 1.0 / I[1], 1.0 / I[2] - 1.0 / I[1]
+    first = 1.0 / I[0] - 1.0 / I[1]
+    third = 1.0 / I[2] - 1.0 / I[1]
     if first != 0.0 or third != 0.0:
         turn = dt * sqrt(dot(omega, omega))
         single = turn < SLOW_ANGLE or first == 0.0 or third == 0.0
@@ -105,15 +111,24 @@ def turned_back(angle, x, y):
 def fly(m, free, t, q, v, dt):
     """Move a RIGID free flyer: its centre of mass goes straight, and the body turns freely."""
     b = free.root[t]
-    i, k = m.q_start[b], m.v_start[b]
-    c, omega = load(free.center, t), (v[k + 3], v[k + 4], v[k + 5])
+    i = m.q_start[b]
+    k = m.v_start[b]
+    c = load(free.center, t)
+    omega = (v[k + 3], v[k + 4], v[k + 5])
     u = add((v[k], v[k + 1], v[k + 2]), cross(omega, c))
-    x, y, z, s = q[i + 3], q[i + 4], q[i + 5], q[i + 6]
+    x = q[i + 3]
+    y = q[i + 4]
+    z = q[i + 5]
+    s = q[i + 6]
     path = scale(dt, turn_vector(x, y, z, s, u))
     if dot(omega, omega) > 0.0:
-        center, velocity = turn_vector(x, y, z, s, c), turn_vector(x, y, z, s, u)
+        center = turn_vector(x, y, z, s, c)
+        velocity = turn_vector(x, y, z, s, u)
         turn_freely(free, t, q, i + 3, v, k + 3, dt)
-        x, y, z, s = q[i + 3], q[i + 4], q[i + 5], q[i + 6]
+        x = q[i + 3]
+        y = q[i + 4]
+        z = q[i + 5]
+        s = q[i + 6]
         path = add(path, subtract(center, turn_vector(x, y, z, s, c)))
         u = turn_vector(-x, -y, -z, s, velocity)
         v[k], v[k + 1], v[k + 2] = subtract(u, cross((v[k + 3], v[k + 4], v[k + 5]), c))
@@ -183,9 +198,12 @@ def to_fixed_axes(m, free, w, q, t, p, way):
             transform(w.rotation, b, l) if way > 0.0 else transform_back(w.rotation, b, l)
         )
     else:
-        place, linear, angular = load(w.position, b), (p[0], p[1], p[2]), (p[3], p[4], p[5])
+        place = load(w.position, b)
+        linear = (p[0], p[1], p[2])
+        angular = (p[3], p[4], p[5])
         if way > 0.0:
-            linear, angular = transform(w.rotation, b, linear), transform(w.rotation, b, angular)
+            linear = transform(w.rotation, b, linear)
+            angular = transform(w.rotation, b, angular)
             angular = add(angular, cross(place, linear))
         else:
             angular = transform_back(w.rotation, b, subtract(angular, cross(place, linear)))
@@ -209,7 +227,8 @@ def linear_momentum(m, free, w, t, p):
 @kernel
 def center_of(m, w, tree_of_body, t):
     """Return the centre of mass of tree t [m] and its mass [kg]."""
-    mass, moment = 0.0, (0.0, 0.0, 0.0)
+    mass = 0.0
+    moment = (0.0, 0.0, 0.0)
     for b in range(m.kind.shape[0]):
         if tree_of_body[b] == t:
             mass += m.mass[b]

@@ -41,14 +41,17 @@ def body_axes_to_dofs(w, b, first):
 @kernel
 def joint_position(m, q, b):
     """Return the position of a revolute or prismatic joint, its own or what it follows."""
-    k, x = m.v_start[b], q[m.q_start[b]]
+    k = m.v_start[b]
+    x = q[m.q_start[b]]
     return x if m.dof_leader[k] == k else m.dof_ratio[k] * x + m.dof_offset[k]
 
 
 @kernel
 def move_joint(m, q, w, b):
     """Move body b from its joint frame to its pose; write the axes of the joint's dofs."""
-    kind, i, k = m.kind[b], m.q_start[b], m.v_start[b]
+    kind = m.kind[b]
+    i = m.q_start[b]
+    k = m.v_start[b]
     if kind == PLANAR:  # axes of the joint frame: they do not turn with the body
         body_axes_to_dofs(w, b, k)
         store(
@@ -74,7 +77,10 @@ def move_joint(m, q, w, b):
                 add(load(w.position, b), transform(w.rotation, b, (q[i], q[i + 1], q[i + 2]))),
             )
             i += 3
-        x, y, z, s = q[i], q[i + 1], q[i + 2], q[i + 3]
+        x = q[i]
+        y = q[i + 1]
+        z = q[i + 2]
+        s = q[i + 3]
         turn_frame(
             w.rotation,
             b,
@@ -94,19 +100,26 @@ def forward_kinematics(m, q, w):
     Quaternions and (cos, sin) pairs must have length one; kernels do not check. A joint frame has
     R = R_parent R_placement, p = p_parent + R_parent p_placement.
     """
-    n, same = q.shape[0], 0
+    n = q.shape[0]
+    same = 0
     while same < n and q[same] == w.placed_q[same]:
         same += 1
     if 0 < n == same:
         return
     for k in range(same, n):
         w.placed_q[k] = q[k]
-    R, fixed = w.rotation, m.placement_rotation
+    R = w.rotation
+    fixed = m.placement_rotation
     for b in range(m.kind.shape[0]):
-        parent, offset = m.parent[b], load(m.placement_position, b)
-        x, y, z = column(fixed, b, 0), column(fixed, b, 1), column(fixed, b, 2)
+        parent = m.parent[b]
+        offset = load(m.placement_position, b)
+        x = column(fixed, b, 0)
+        y = column(fixed, b, 1)
+        z = column(fixed, b, 2)
         if parent >= 0:
-            x, y, z = transform(R, parent, x), transform(R, parent, y), transform(R, parent, z)
+            x = transform(R, parent, x)
+            y = transform(R, parent, y)
+            z = transform(R, parent, z)
             offset = add(load(w.position, parent), transform(R, parent, offset))
         store_columns(R, b, x, y, z)
         store(w.position, b, offset)

@@ -17,10 +17,9 @@ import numpy as np
 from reference.complementarity.problem import ImpactProblem
 from reference.complementarity.solution import Answer, velocity_scale
 
-_ROUNDS, _STILL = (
-    50,
-    1e-9,
-)  # of cone programs; change of the shift, share of the velocity scale, at which they stop
+# of cone programs; change of the shift, share of the velocity scale, at which they stop
+_ROUNDS = 50
+_STILL = 1e-9
 # Backends and accuracy requested at unit W and b; the defaults are 1e-4 to 1e-6. Near the apex of
 # cones, the natural map reaches its square root. Without friction, below 1e-11, Clarabel drifts
 # along the unbounded set of impulses of opposed contacts (p to 6e9, residual up to 4e-6).
@@ -50,12 +49,13 @@ def solve(problem: ImpactProblem, method: str) -> Answer:
     import cvxpy as cp
 
     backend, settings = _BACKENDS[method]
-    rows, speed, mu = problem.factor, velocity_scale(problem), problem.friction_or_zero
+    rows = problem.factor
+    speed = velocity_scale(problem)
+    mu = problem.friction_or_zero
     root = float(np.linalg.norm(rows, axis=1).max(initial=0.0)) or 1.0
-    p, offset = (
-        cp.Variable(problem.size),
-        cp.Parameter(problem.size),
-    )  # a parameter makes repeated solves cheap
+    # a parameter makes repeated solves cheap
+    p = cp.Variable(problem.size)
+    offset = cp.Parameter(problem.size)
     blocks = cp.reshape(p, (problem.contact_size, problem.contacts), order="F")
     rough, smooth = (np.flatnonzero(kind) for kind in (mu > 0.0, mu == 0.0))
     cones: list[Any] = []
@@ -84,7 +84,8 @@ def solve(problem: ImpactProblem, method: str) -> Answer:
             return Answer(impulse, f"{backend}: {program.status}{ended}")
         u = problem.contact_velocity(impulse).reshape(-1, problem.contact_size)
         slipping = mu * np.linalg.norm(u[:, 1:], axis=1)
-        before, shift = shift, slipping / speed
+        before = shift
+        shift = slipping / speed
         if np.abs(shift - before).max(initial=0.0) <= _STILL:
             return Answer(impulse, f"fixed point after {done} programs")
     return Answer(impulse, f"fixed point not reached in {_ROUNDS} programs")

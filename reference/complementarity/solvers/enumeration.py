@@ -40,7 +40,8 @@ def all_solutions(problem: ImpactProblem) -> list[Floats]:
     found: list[Floats] = []
     diagonal = np.diag(problem.delassus)
     scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
-    w, b = scale[:, None] * problem.delassus * scale, scale * problem.offset
+    w = scale[:, None] * problem.delassus * scale
+    b = scale * problem.offset
     speed = float(np.abs(b).max(initial=0.0)) or 1.0
     subsets = (combinations(range(problem.size), k) for k in range(problem.size + 1))
     for chosen in chain.from_iterable(subsets):

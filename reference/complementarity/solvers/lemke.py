@@ -31,11 +31,10 @@ def import_lcp_lemke() -> Callable[..., Any]:
 def solve(problem: ImpactProblem) -> Answer:
     """Return Lemke's solution, or none if it ends on a ray."""
     lcp_lemke = import_lcp_lemke()
-    inertia, speed = (
-        float(np.abs(problem.delassus).max(initial=0.0)) or 1.0,
-        velocity_scale(problem),
-    )
-    w, b = problem.delassus / inertia, problem.offset / speed
+    inertia = float(np.abs(problem.delassus).max(initial=0.0)) or 1.0
+    speed = velocity_scale(problem)
+    w = problem.delassus / inertia
+    b = problem.offset / speed
     most = _PIVOTS * (problem.size + 1)
     result = lcp_lemke(w, b, max_iter=most)
     if not result.success:  # a W without zero eigenvalues has no rays

@@ -29,10 +29,12 @@ def solve(problem: ImpactProblem, method: str) -> Answer:
         )
     # the order (t, t, n) of every contact
     turned = (np.array([1, 2, 0]) + 3 * np.arange(problem.contacts)[:, None]).ravel()
-    inertia, speed = float(np.abs(problem.delassus).max()) or 1.0, velocity_scale(problem)
+    inertia = float(np.abs(problem.delassus).max()) or 1.0
+    speed = velocity_scale(problem)
     w = np.ascontiguousarray((problem.delassus / inertia)[np.ix_(turned, turned)])
     model = pin.Model()
-    models, states = pin.StdVec_ConstraintModel(), pin.StdVec_ConstraintData()
+    models = pin.StdVec_ConstraintModel()
+    states = pin.StdVec_ConstraintData()
     for mu in problem.friction_or_zero:  # point contacts of which only the friction is set
         contact = pin.PointContactConstraintModel(model)
         contact.setFriction(float(mu))
@@ -42,7 +44,8 @@ def solve(problem: ImpactProblem, method: str) -> Answer:
         getattr(pin, method + name)()
         for name in ("ConstraintSolver", "SolverSettings", "SolverResult")
     )
-    settings.max_iterations, settings.solve_ncp = _ITERATIONS, not problem.relaxed
+    settings.max_iterations = _ITERATIONS
+    settings.solve_ncp = not problem.relaxed
     settings.absolute_feasibility_tol = settings.absolute_complementarity_tol = _ACCURACY
     settings.relative_feasibility_tol = settings.relative_complementarity_tol = _ACCURACY
     offset = (problem.offset / speed)[turned]

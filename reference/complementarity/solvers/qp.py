@@ -57,7 +57,8 @@ def daqp(rows: Floats, offset: Floats) -> Floats:
         length > 0.0, length, 1.0
     )  # unit rows, unit velocities: daqp's tolerances are absolute
     scale = float(np.abs(offset / unit).max(initial=0.0)) or 1.0
-    upper, lower = np.full(n, _INFINITE), -offset / unit / scale
+    upper = np.full(n, _INFINITE)
+    lower = -offset / unit / scale
     sense = np.full(n, _INEQUALITY, dtype=np.int32)
     for accuracy in (_ACTIVE_SET, _OPPOSED):
         _, _, flag, detail = daqp.solve(
@@ -82,7 +83,8 @@ def quadprog(rows: Floats, offset: Floats) -> Floats:
     (SolverError)."""
     from qpsolvers import Problem, solve_problem
 
-    d, length = rows.shape[1], np.linalg.norm(rows, axis=1)
+    d = rows.shape[1]
+    length = np.linalg.norm(rows, axis=1)
     unit = np.where(length > 0.0, length, 1.0)
     answer = solve_problem(
         Problem(np.eye(d), np.zeros(d), -rows / unit[:, None], offset / unit), solver="quadprog"
@@ -96,7 +98,8 @@ def _by_proxqp(problem: ImpactProblem) -> Answer:
     from qpsolvers import Problem, solve_problem
 
     w = problem.factor @ problem.factor.T
-    inertia, speed = float(np.abs(w).max(initial=0.0)) or 1.0, velocity_scale(problem)
+    inertia = float(np.abs(w).max(initial=0.0)) or 1.0
+    speed = velocity_scale(problem)
     program = Problem(w / inertia, problem.offset / speed, lb=np.zeros(problem.size))
     answer = solve_problem(program, solver="proxqp", eps_abs=_PROXQP, eps_rel=0.0)
     if answer.x is None:

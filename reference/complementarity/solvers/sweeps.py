@@ -29,7 +29,8 @@ _WORK = 1e9
 _LEAST_SWEEPS = 500
 # Stop after a sweep that changes no contact velocity by more than this share of the scale, without
 # and with friction.
-_STILL, _STILL_ON_CONES = 1e-14, 1e-13
+_STILL = 1e-14
+_STILL_ON_CONES = 1e-13
 # projections per contact and sweep: one is enough for a scalar block, friction blocks need more
 _INNER = 4
 
@@ -86,7 +87,8 @@ def settles(problem: ImpactProblem, sweeps: int) -> bool:
 
 
 def _on_cones(problem: ImpactProblem, sweeps: int = _SWEEPS) -> Answer:
-    size, k = problem.contact_size, problem.contacts
+    size = problem.contact_size
+    k = problem.contacts
     blocks = problem.delassus.reshape(k, size, k, size)[np.arange(k), :, np.arange(k)]
     inertia = np.linalg.norm(blocks, ord=2, axis=(1, 2))
     inertia[inertia == 0.0] = 1.0
@@ -115,7 +117,8 @@ def _sweep_cones(w, b, mu, inertia, relaxed, p, u, trial, sweeps, still):  # typ
         largest = 0.0
         for k in range(len(mu)):
             for _ in range(_INNER):
-                first, slip = k * size, 0.0
+                first = k * size
+                slip = 0.0
                 for i in range(size):
                     u[i] = b[first + i]
                     for j in range(len(b)):

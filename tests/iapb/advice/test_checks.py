@@ -21,7 +21,8 @@ SIDES = [
     {"name": name, "kind": "box", "size": [0.2, 2], "center": [x, 0]}
     for name, x in (("l", -0.13), ("r", 0.13))
 ]
-SIDE, MASS = 0.1, 1.0
+SIDE = 0.1
+MASS = 1.0
 ROUGH = ImpulseAugmented(friction_in_impacts=True)
 
 
@@ -220,11 +221,9 @@ def test_the_step_holds_k_plus_2b_up_to_4_at_the_lightest_mode_of_a_box_on_two_c
 ) -> None:
     """Rocking: J M⁻¹ Jᵀ of two corners has the eigenvalue 2 a²/I = 3/m, a half a side; k ≤ 1 for
     what meets."""
-    limits, dt, mobility = (
-        step_limits(Start(scene(box(), damping=damping, stiffness=1e4))),
-        1e-3,
-        3.0 / MASS,
-    )
+    limits = step_limits(Start(scene(box(), damping=damping, stiffness=1e4)))
+    dt = 1e-3
+    mobility = 3.0 / MASS
     assert limits is not None and limits.mass == pytest.approx(MASS / 3.0)
     expected = min(1.0, 4.0 - 2.0 * damping * mobility * dt) / (mobility * dt**2)
     assert limits.stiffness == pytest.approx(expected, rel=1e-6)

@@ -18,7 +18,8 @@ from iapb.simulation import simulate
 BALL = {"kind": "sphere", "radius": 0.005}
 DISC = {"kind": "circle", "radius": 0.005}
 SIDE = 0.1
-CUBE, SQUARE = {"kind": "box", "size": [0.01] * 3}, {"kind": "box", "size": [0.01] * 2}
+CUBE = {"kind": "box", "size": [0.01] * 3}
+SQUARE = {"kind": "box", "size": [0.01] * 2}
 
 
 def body(
@@ -76,7 +77,9 @@ def test_each_reason_is_found_in_the_arrays_of_a_sound_run() -> None:
     run = fallen(stiffness=1e4)
     assert run.distrust == distrust_of(run) == () and len(repr(run)) < 160
     rising, far, back, lost = np.linspace(0.0, 1.0, 201), *(run.q.copy() for _ in range(3))
-    far[-1, 0], back[-1, 0], lost[-1, 0] = 1e3, -1e3, np.nan
+    far[-1, 0] = 1e3
+    back[-1, 0] = -1e3
+    lost[-1, 0] = np.nan
     for planted, why in (
         (
             replace(run, energy=run.energy | {"kinetic": run.energy["kinetic"] + rising}),
@@ -109,7 +112,8 @@ def test_a_deep_landing_is_right_while_its_step_explains_it_and_it_fades() -> No
     run = landed()
     table = run.contacts
     assert distrust_of(run) == ()
-    turned, deeper = table.normal.copy(), table.gap.copy()
+    turned = table.normal.copy()
+    deeper = table.gap.copy()
     turned[4:] *= -1.0  # out on the other side
     deeper[4:6] -= 0.03 * SIDE
     for planted in (
@@ -154,7 +158,8 @@ def test_a_stick_that_a_floor_stops_within_its_thickness_is_right(
 def test_two_masses_and_a_wall_count_the_digits_of_pi(k: int, rate: float, radius: float) -> None:
     """Law (Galperin 2003): masses 1 and 100^k collide as often as the first k + 1 digits of pi
     say. The small one goes at most 0.6 of its width in a step."""
-    shape, speed = {"kind": "circle", "radius": radius}, 1.2 * radius * rate / 10.0**k
+    shape = {"kind": "circle", "radius": radius}
+    speed = 1.2 * radius * rate / 10.0**k
     small = body("small", shape, [-0.5, 0], [], mass=1.0)
     large = body("large", shape, [-0.8, 0], [speed], mass=100.0**k)
     wall = {"name": "wall", "kind": "half_plane", "point": [0, 0], "normal": [-1, 0]}
@@ -209,7 +214,8 @@ def faster(run: Run) -> np.ndarray:
 @pytest.mark.parametrize("meet", [False, True])
 def test_energy_that_a_heavy_neighbour_hides_is_seen(thrown: Run, meet: bool) -> None:
     """If the two touch, one may take energy from the other, but only by forces."""
-    table, one = thrown.contacts, np.zeros(int(meet))
+    table = thrown.contacts
+    one = np.zeros(int(meet))
     touching = replace(
         table,
         offsets=table.offsets + np.minimum(np.arange(101), len(one)),
@@ -231,7 +237,8 @@ def test_contact_forces_that_drive_a_body_which_touches_no_other_are_seen(
     thrown: Run, kind: str
 ) -> None:
     """The work of the forces explains the motion, but no other body gave the energy."""
-    v, force = faster(thrown), np.zeros_like(thrown.penalty_force)
+    v = faster(thrown)
+    force = np.zeros_like(thrown.penalty_force)
     force[:, :3] = 0.2 * np.diff(v - thrown.v, axis=0)[:, :3] * 1000.0
     found = distrust_of(replace(thrown, v=v, **{f"{kind}_force": force}))
     assert (
@@ -246,9 +253,12 @@ def test_contact_forces_that_drive_a_body_which_touches_no_other_are_seen(
 def test_a_spin_that_turns_while_nothing_touches_the_body_is_seen(
     thrown: Run, touched: bool
 ) -> None:
-    v, force = thrown.v.copy(), np.zeros_like(thrown.penalty_force)
+    v = thrown.v.copy()
+    force = np.zeros_like(thrown.penalty_force)
     angle = np.linspace(0.0, 0.05, len(v))
-    v[:, 3], v[:, 5] = 20.0 * np.sin(angle), 20.0 * np.cos(angle)  # its energy stays
+    # its energy stays
+    v[:, 3] = 20.0 * np.sin(angle)
+    v[:, 5] = 20.0 * np.cos(angle)
     force[:, 4] = 1e-9 * touched
     found = distrust_of(replace(thrown, v=v, penalty_force=force))
     assert found == (
@@ -257,8 +267,11 @@ def test_a_spin_that_turns_while_nothing_touches_the_body_is_seen(
 
 
 def test_a_later_part_of_a_run_is_followed_from_its_second_state_on(thrown: Run) -> None:
-    q, v = thrown.q.copy(), thrown.v.copy()
-    q[0, 2], v[0, :6] = 1.0, 0.0  # the start of the whole run
+    q = thrown.q.copy()
+    v = thrown.v.copy()
+    # the start of the whole run
+    q[0, 2] = 1.0
+    v[0, :6] = 0.0
     part = replace(thrown, q=q, v=v, time=thrown.time + 1.0)
     assert distrust_of(part) == () != distrust_of(replace(part, time=thrown.time))
 
@@ -275,7 +288,9 @@ def plate(*size: float, center: Any = None, **values: Any) -> list[dict[str, Any
     ]
 
 
-UP, HIGH, DOWN = [0, 0.1], [0, 0.105], [0, -30.0]
+UP = [0, 0.1]
+HIGH = [0, 0.105]
+DOWN = [0, -30.0]
 PASSAGES: dict[str, tuple[list[Any], list[Any], str]] = {
     "box, plate": ([body("a", SQUARE, HIGH, DOWN)], plate(0.2, 0.01), "a passes through plate"),
     "beside it": ([body("a", SQUARE, UP, DOWN)], plate(0.2, 0.01, center=[0.106, 0]), ""),
@@ -345,7 +360,8 @@ for turned in (
     0.5,
     -2.0,
 ):  # a ball 10 mm beside its body, 40 mm in a step, through a plate or past its end
-    c, s = math.cos(turned), math.sin(turned)
+    c = math.cos(turned)
+    s = math.sin(turned)
     for kind, form in (
         ("box", {"size": [0.2, 0.004]}),
         ("polygon", {"vertices": [[-0.1, -0.002], [0.1, -0.002], [0.1, 0.002], [-0.1, 0.002]]}),

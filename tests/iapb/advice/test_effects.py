@@ -131,16 +131,16 @@ def test_every_effect_is_switched_above() -> None:
 @pytest.mark.parametrize("name", SWITCHES)
 def test_a_scene_alone_switches_the_effect_and_the_reason_has_its_values(name: str) -> None:
     scene, on, off, values = SWITCHES[name]
-    switched_on, switched_off = (
-        effect(scene.with_values(on), name),
-        effect(scene.with_values(off), name),
-    )
+    switched_on = effect(scene.with_values(on), name)
+    switched_off = effect(scene.with_values(off), name)
     assert switched_on.active and not switched_off.active and switched_on.left_out
     assert values in switched_on.reason and switched_off.reason != switched_on.reason
 
 
-RIGID, RUBBING = RigidConstraints(), "impulse-augmented penalty with impact friction"
-ROUGH, BARE = PEG.with_values({"contact.friction": 0.3}), PEG.with_values({"couplings": {}})
+RIGID = RigidConstraints()
+RUBBING = "impulse-augmented penalty with impact friction"
+ROUGH = PEG.with_values({"contact.friction": 0.3})
+BARE = PEG.with_values({"couplings": {}})
 PER_BODY = ROUGH.with_values({"contact.self_collision_rows": "per_body"})
 GAINS = FourChannel((5.0, 6.0, 7.0), (1.0, 1.0, 1.0))
 DRIFTING = SimpleNamespace(name="drifting")  # a law that says nothing of joints

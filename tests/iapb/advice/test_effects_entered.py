@@ -63,7 +63,9 @@ FULL = {
     "contact.cluster_distance": 1e-4,
     "contact.coherence_distance": 1e-2,
 }
-IAPB, SPREAD, PENALTY = ("impulses", {}), ("impulses", {"rendering": "spread"}), ("penalty", {})
+IAPB = ("impulses", {})
+SPREAD = ("impulses", {"rendering": "spread"})
+PENALTY = ("penalty", {})
 RUBBING = ("impulses", {"friction_in_impacts": True})
 
 

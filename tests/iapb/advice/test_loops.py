@@ -40,7 +40,9 @@ def random_loop(rng: np.random.Generator, d: int) -> HapticLoop:
 def largest_root(loop: HapticLoop) -> float:
     """The spectral radius of the step, written as a program: couple, move the tool, then the
     device."""
-    d, N, dt = len(loop.mass), loop.delay, loop.dt
+    d = len(loop.mass)
+    N = loop.delay
+    dt = loop.dt
     inverse = np.linalg.inv(loop.mass)
     drag = np.diag(loop.joint_damping)
     drag = drag + dt * loop.spring + loop.damper if loop.implicit else drag
@@ -68,7 +70,8 @@ def largest_root(loop: HapticLoop) -> float:
 
 @pytest.mark.parametrize("d", [1, 2, 3])
 def test_a_loop_grows_where_the_step_has_an_eigenvalue_outside_the_circle(d: int) -> None:
-    rng, grown = np.random.default_rng(d), 0
+    rng = np.random.default_rng(d)
+    grown = 0
     for _ in range(60):
         loop = random_loop(rng, d)
         limit = float(np.exp(max(loop.dt / SLOW, CLOSE)))
@@ -85,7 +88,9 @@ def test_a_loop_grows_where_the_step_has_an_eigenvalue_outside_the_circle(d: int
 )
 def test_without_delay_the_limit_is_the_closed_form(K: float, share: float, grows: bool) -> None:
     """K Δt² + 2 B Δt = 2 m, with K = 0 the condition B Δt/(m/2) < 2."""
-    m, dt, zero = 0.7, 1e-3, np.zeros((1, 1))
+    m = 0.7
+    dt = 1e-3
+    zero = np.zeros((1, 1))
     B = share * (2.0 * m - K * dt**2) / (2.0 * dt)
     none = np.zeros(1)
     loop = HapticLoop(
@@ -281,7 +286,9 @@ def test_sensors_too_coarse_for_the_gains_are_named_with_the_resolution_to_set(
 
 # Random loops: what blows up was warned of, and little else was
 
-PRESSED, FREE = 16.0, 8.0  # s: the hand presses, wanders freely, and presses again
+# s: the hand presses, wanders freely, and presses again
+PRESSED = 16.0
+FREE = 8.0
 
 
 def random_scene(rng: np.random.Generator) -> Scene:
@@ -291,12 +298,14 @@ def random_scene(rng: np.random.Generator) -> Scene:
     def between(low: float, high: float) -> float:
         return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
-    mass, K = between(0.05, 3.0), between(10.0, 2e4)
+    mass = between(0.05, 3.0)
+    K = between(10.0, 2e4)
     B = between(0.02, 3.0) * 2.0 * np.sqrt(0.5 * K * mass)
     push = mass * between(1.0, 10.0)
     contact: dict[str, Any] = {"restitution": float(rng.choice([0.0, 0.0, 0.5]))}
     if rng.random() < 0.3:
-        stiffness, damping = between(600.0 * push, 6000.0 * push), between(1.0, 50.0)
+        stiffness = between(600.0 * push, 6000.0 * push)
+        damping = between(1.0, 50.0)
         contact |= {"forces": "paper", "stiffness": stiffness, "damping": damping}
     scene = slider(
         K,
@@ -333,7 +342,8 @@ def blows_up(run: Run, scene: Scene) -> bool:
     assert scene.hand is not None
     push = scene.hand.largest_force()
     approach = np.sqrt(0.04 * push / scene.bodies[0].mass)
-    speed, apart = np.abs(run.device_v[:, 0]), np.abs(run.device_v[:, 0] - run.v[:, 0])
+    speed = np.abs(run.device_v[:, 0])
+    apart = np.abs(run.device_v[:, 0] - run.v[:, 0])
     for values, start, stop in (
         (speed, 0.0, PRESSED),
         (apart, PRESSED + 1.0, PRESSED + FREE),
@@ -357,10 +367,15 @@ def blows_up(run: Run, scene: Scene) -> bool:
     [(22, 20), pytest.param(21, 100, marks=pytest.mark.thorough)],
 )
 def test_random_loops_that_blow_up_were_warned_of_and_few_others(seed: int, count: int) -> None:
-    rng, missed, warned, calm, doubted = np.random.default_rng(seed), [], 0, 0, 0
+    rng = np.random.default_rng(seed)
+    missed = []
+    warned = 0
+    calm = 0
+    doubted = 0
     for i in range(count):
         scene = random_scene(rng)
-        said, run = coupled(scene), run_coupled(scene)
+        said = coupled(scene)
+        run = run_coupled(scene)
         if blows_up(run, scene):
             missed += [] if said else [i]
         else:

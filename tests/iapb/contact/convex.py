@@ -33,18 +33,23 @@ class Convex(NamedTuple):
 
 def convex(shapes: Shapes, s: int, R: np.ndarray, p: np.ndarray) -> Convex:
     """Shape s with its bodies at rotations R (n, 3, 3) and positions p (n, 3)."""
-    body, kind = int(shapes.body[s]), int(shapes.kind[s])
+    body = int(shapes.body[s])
+    kind = int(shapes.kind[s])
     turn, origin = (R[body], p[body]) if body >= 0 else (np.eye(3), np.zeros(3))
     rows = slice(shapes.first[s], shapes.first[s] + shapes.count[s])
     flat = np.pad(shapes.vertices[rows], ((0, 0), (0, 1)))
-    corners, edges = shapes.center[s][None], np.zeros((0, 3))
-    normals, radius = np.zeros((0, 3)), float(shapes.radius[s])
+    corners = shapes.center[s][None]
+    edges = np.zeros((0, 3))
+    normals = np.zeros((0, 3))
+    radius = float(shapes.radius[s])
     if kind == HALF_PLANE:
-        corners, normals = flat[:1], flat[1:]
+        corners = flat[:1]
+        normals = flat[1:]
     elif kind in ENDLESS:
         normals = shapes.axes[s][:, 2][None]
     elif kind == POLYGON:
-        corners, edges = flat, np.roll(flat, -1, axis=0) - flat
+        corners = flat
+        edges = np.roll(flat, -1, axis=0) - flat
         normals = np.cross(edges, [0.0, 0.0, 1.0])
     elif kind == BOX:
         edges = shapes.axes[s].T

@@ -16,10 +16,9 @@ from iapb.scene.model import scene_kind
 from iapb.system import System
 
 Floats = NDArray[np.float64]
-ALIGNED, TOUCHING = (
-    0.85,
-    1e-12,
-)  # cosine of the normals of one surface; overlap [m] that still counts as touching
+# cosine of the normals of one surface; overlap [m] that still counts as touching
+ALIGNED = 0.85
+TOUCHING = 1e-12
 
 
 def scene_of(bodies: list[dict[str, Any]], walls: list[dict[str, Any]], **values: Any) -> Scene:
@@ -62,7 +61,8 @@ def breach_of_coulomb(T: Floats, p_t: Floats, limit: Floats, v_plus: Floats) -> 
     p_t on it."""
     worst = 0.0
     for rows, own, most in zip(T, p_t, limit, strict=True):
-        w, length = rows @ v_plus, float(np.linalg.norm(own))
+        w = rows @ v_plus
+        length = float(np.linalg.norm(own))
         slides = length >= most * (1.0 - 1e-7) and length > 0.0
         worst = max(
             worst, float(np.linalg.norm(w + slides * np.linalg.norm(w) * own / max(length, 1e-300)))
@@ -109,13 +109,15 @@ def contacts_of(system: System, q: Floats) -> list[Contact]:
 def stops(system: System, q: Floats) -> list[Contact]:
     """Both ends of each range: gap = ± r (q − bound), r the radius of gyration of all that a
     revolute joint carries."""
-    m, found = system.mechanism, []
+    m = system.mechanism
+    found = []
     names = ["world", *(body.name for body in system.scene.bodies)]
     parents = [names.index(body.parent) - 1 for body in system.scene.bodies]
     for b, body in enumerate(system.scene.bodies):
         if body.joint_limits is None:
             continue
-        dof, carried = int(m.arrays.v_start[b]), 0.0
+        dof = int(m.arrays.v_start[b])
+        carried = 0.0
         for other, each in enumerate(system.scene.bodies):
             ancestor = other
             while ancestor >= 0 and ancestor != b:
@@ -127,7 +129,8 @@ def stops(system: System, q: Floats) -> list[Contact]:
             else 1.0
         )
         for sign, bound in zip((1.0, -1.0), body.joint_limits, strict=True):
-            gap, number = sign * arm * (q[m.arrays.q_start[b]] - bound), 10**6 + len(found)
+            gap = sign * arm * (q[m.arrays.q_start[b]] - bound)
+            number = 10**6 + len(found)
             nowhere = np.zeros(3)  # what counts is the row ± r e_k
             found.append(
                 Contact(
@@ -217,7 +220,8 @@ def relative_jacobian(mechanism: Mechanism, q: Floats, c: Contact) -> Floats:
 
 def resting(scene: Scene, c: Contact, J: Floats, v: Floats) -> tuple[float, Floats]:
     """F_n of (5) and the friction force (6) on a at a contact."""
-    given, relative = scene.contact, J @ v
+    given = scene.contact
+    relative = J @ v
     speed = float(c.normal @ relative)
     force = -given.stiffness * c.gap - given.damping * speed
     force = max(force, 0.0) if given.penalty == "clamped" else force

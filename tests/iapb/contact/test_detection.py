@@ -44,10 +44,8 @@ def random_shape(rng: np.random.Generator, space: bool, kind: str) -> Values:
 
 def crowd(space: bool, seed: int, scale: float = 1.0) -> Scene:
     """Six bodies, one of them with two shapes; a plane, and a static shape of each kind."""
-    rng, kinds = (
-        np.random.default_rng(seed),
-        ("sphere", "box") if space else ("circle", "box", "polygon"),
-    )
+    rng = np.random.default_rng(seed)
+    kinds = ("sphere", "box") if space else ("circle", "box", "polygon")
     free = (
         {"joint": "free_flyer", "inertia": [1, 1, 1]}
         if space
@@ -107,7 +105,8 @@ def test_contacts_of_a_crowd_are_those_of_support_functions(space: bool, margin:
         for a, b in system.pairs.tolist():
             mine = [i for i, name in enumerate(names) if name[:2] == (a, b)]
             counts.add(len(mine))
-            one, other = solids[a], solids[b]
+            one = solids[a]
+            other = solids[b]
             expected = separations(one, other, directions(one, other)).max()
             # edges give way to faces, and b's face to a's, within these shares
             boxes = len(one.corners) == len(other.corners) == 8
@@ -115,7 +114,9 @@ def test_contacts_of_a_crowd_are_those_of_support_functions(space: bool, margin:
             if abs(expected - margin) > near:
                 assert bool(mine) == (expected <= margin), (a, b)
             for i in mine:
-                n, x, gap = found.normal[i], found.point[i], found.gap[i]
+                n = found.normal[i]
+                x = found.point[i]
+                gap = found.gap[i]
                 along = separations(one, other, n[None])[0]
                 assert np.linalg.norm(n) == pytest.approx(1.0, abs=1e-14)
                 assert gap <= margin and along == pytest.approx(expected, abs=near)
@@ -133,7 +134,9 @@ def test_contacts_of_a_crowd_are_those_of_support_functions(space: bool, margin:
 
 def test_boxes_in_space_overlap_as_coal_says() -> None:
     """Depth of two boxes at random, where a face decides and where edges do."""
-    coal, rng, compared = pytest.importorskip("coal"), np.random.default_rng(0), 0
+    coal = pytest.importorskip("coal")
+    rng = np.random.default_rng(0)
+    compared = 0
     for _ in range(200):
         sizes = rng.uniform(0.5, 1.5, size=(2, 3))
         axes = np.array([np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(2)])
@@ -143,12 +146,14 @@ def test_boxes_in_space_overlap_as_coal_says() -> None:
             [Shape(BOX, k, half_size=0.5 * size) for k, size in enumerate(sizes)], True
         )
         found = ContactFinder(shapes, candidate_pairs(shapes)).find(axes, origins)
-        (one, other), result = (coal.Box(*size) for size in sizes), coal.CollisionResult()
+        (one, other) = (coal.Box(*size) for size in sizes)
+        result = coal.CollisionResult()
         poses = [coal.Transform3s(axes[k], origins[k]) for k in range(2)]
         if not coal.collide(one, poses[0], other, poses[1], coal.CollisionRequest(), result):
             assert not len(found.gap) or found.gap.min() > -1e-6
             continue
-        depth, compared = result.getContact(0).penetration_depth, compared + 1
+        depth = result.getContact(0).penetration_depth
+        compared = compared + 1
         assert found.gap.min() == pytest.approx(depth, abs=1e-6 + EDGE_SHARE * abs(depth))
     assert compared > 50
 
@@ -177,7 +182,8 @@ def test_names_last_while_bodies_move_a_little(space: bool) -> None:
 def test_the_unit_of_length_changes_no_bit(space: bool, factor: float) -> None:
     """A power of two rounds nothing, and no length is built in."""
     for seed in range(10):
-        plain, scaled = System(crowd(space, seed)), System(crowd(space, seed, factor))
+        plain = System(crowd(space, seed))
+        scaled = System(crowd(space, seed, factor))
         q = thrown(plain, seed)
         size = len(q) // 6
         lengths = np.tile([1.0] * 3 + [0.0] * 4 if size == 7 else [1.0, 1.0, 0.0], 6)
@@ -190,8 +196,10 @@ def test_the_unit_of_length_changes_no_bit(space: bool, factor: float) -> None:
 
 # (shape of a, shape of b or wall, place of a, gap, contacts): all numbers are binary, so that the
 # gap is exact.
-DISC, BRICK = {"kind": "circle", "radius": 0.5}, {"kind": "box", "size": [1, 1]}
-BALL, CUBE = {"kind": "sphere", "radius": 0.5}, {"kind": "box", "size": [1, 1, 1]}
+DISC = {"kind": "circle", "radius": 0.5}
+BRICK = {"kind": "box", "size": [1, 1]}
+BALL = {"kind": "sphere", "radius": 0.5}
+CUBE = {"kind": "box", "size": [1, 1, 1]}
 GROUND = {"kind": "half_plane", "point": [0, 0], "normal": [0, 1]}
 FLOOR = {"kind": "half_space", "point": [0, 0, 0], "normal": [0, 0, 1]}
 EXACT: list[tuple[Values, Values, list[float], float, int]] = [
@@ -241,7 +249,8 @@ def at_places(system: System, *places: list[float]) -> np.ndarray:
 def test_a_gap_of_the_margin_is_kept_and_the_next_number_is_not(
     a: Values, b: Values, place: list[float], gap: float, number: int, swapped: bool
 ) -> None:
-    swapped, still = swapped and "normal" not in b, [0.0] * len(place)
+    swapped = swapped and "normal" not in b
+    still = [0.0] * len(place)
     system = pair_of(a, b, swapped)
     q = at_places(
         system, *((still, place) if swapped else (place,) if "normal" in b else (place, still))
@@ -275,7 +284,8 @@ def test_a_flat_face_on_a_face_keeps_its_points_and_names_whichever_rounding_tak
         place = [0.05, 0.03, 0.0999, tilt / 2] if space else [0.05, 0.0999, tilt]
         q = at_places(system, place, [0.0] * len(place))
         found = system.contacts_at(q)
-        low, high = -0.05 * np.ones(2) + [0.0, -0.02], 0.15 * np.ones(2) + [0.0, -0.02]
+        low = -0.05 * np.ones(2) + [0.0, -0.02]
+        high = 0.15 * np.ones(2) + [0.0, -0.02]
         expected = (
             [[x, y] for x in (low[0], high[0]) for y in (low[1], high[1])]
             if space
@@ -346,7 +356,8 @@ def test_faces_of_two_cubes_never_share_a_name() -> None:
             )
             q[:3] = side * 0.899 * np.eye(3)[axis]
             facing = system.mechanism.placements(q)[0][1].T @ (side * np.eye(3)[axis])
-            found, owner = system.contacts_at(q), (sizes[0], axis, side, *facing.round(6).tolist())
+            found = system.contacts_at(q)
+            owner = (sizes[0], axis, side, *facing.round(6).tolist())
             assert len(found.gap) == 4
             for feature in found.feature.tolist():
                 assert owners.setdefault(feature, owner)[1:] == owner[1:]
@@ -377,9 +388,12 @@ def test_many_shapes_are_found_without_asking_all_pairs() -> None:
         [{"name": "wall", "kind": "half_plane", "point": [0, -0.03], "normal": [0, 1]}],
         contact={"forces": "paper", "stiffness": 500, "restitution": 0.5},
     )
-    run, system, found = simulate(scene), System(scene), 0
+    run = simulate(scene)
+    system = System(scene)
+    found = 0
     for k in range(run.steps):
-        rows, every = slice(*run.contacts.offsets[k : k + 2]), system.contacts_at(run.q[k])
+        rows = slice(*run.contacts.offsets[k : k + 2])
+        every = system.contacts_at(run.q[k])
         found += len(every.gap)
         for name in ("body_a", "body_b", "gap", "point", "normal"):
             np.testing.assert_array_equal(getattr(run.contacts, name)[rows], getattr(every, name))

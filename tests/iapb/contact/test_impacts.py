@@ -31,7 +31,8 @@ Arrays = tuple[Floats, Floats, Floats]
 def problem(seed: int, d: int = 4, c: int = 3, decades: float = 0.3) -> Arrays:
     """M, J, v; coordinates, rows and speeds differ in size by up to the given number of decades."""
     rng = np.random.default_rng(seed)
-    root, units = rng.normal(size=(d, d)), 10.0 ** rng.uniform(-decades, decades, d)
+    root = rng.normal(size=(d, d))
+    units = 10.0 ** rng.uniform(-decades, decades, d)
     mass = (root @ root.T + np.eye(d)) * units[:, None] * units
     rows = rng.normal(size=(c, d)) * units * 10.0 ** rng.uniform(-decades, decades, (c, 1))
     return (
@@ -55,7 +56,8 @@ def exact_change(M: Floats, v: Floats, w: Floats) -> Fraction:
 
 def ill_conditioned(kappa: float, count: int) -> list[Arrays]:
     """M with eigenvalues from 1 to κ in random directions, random rows and velocities."""
-    rng, found = np.random.default_rng(round(kappa)), []
+    rng = np.random.default_rng(round(kappa))
+    found = []
     for _ in range(count):
         d = int(rng.integers(2, 9))
         turn, _ = np.linalg.qr(rng.normal(size=(d, d)))
@@ -75,7 +77,8 @@ def test_exact_passivity_costs_no_restitution(kappa: float) -> None:
     """Relative to the contacts' own speed. Impacts that are shortened until they gain nothing miss
     by up to 2e-3."""
     for M, J, v in ill_conditioned(kappa, 100):
-        found, approach = resolve_impact(M, J, v, 1.0), J @ v
+        found = resolve_impact(M, J, v, 1.0)
+        approach = J @ v
         assert np.abs(J @ found.velocity + approach).max() <= 1e-10 * np.abs(approach).max()
         assert exact_change(M, v, found.velocity) <= 0
 
@@ -123,7 +126,8 @@ def test_an_impact_is_the_exact_one_in_every_unit(seed: int, clamp: bool, decade
     assert (found.rank, found.status) == (3, "complete") and found.clamp == pytest.approx(
         1.0, abs=1e-13
     )
-    change, (low, high) = exact_change(M, v, found.velocity), found.energy_interval
+    change = exact_change(M, v, found.velocity)
+    (low, high) = found.energy_interval
     assert Fraction(low) <= change <= Fraction(high) and low <= found.energy_change <= high
     assert abs(Fraction(found.energy_change) - change) <= Fraction(
         0.51 * math.ulp(found.energy_change)
@@ -146,7 +150,8 @@ def test_energy_is_enclosed_where_its_squares_leave_the_range(power: int, skew: 
         v = np.ldexp(v / np.abs(v).max() / 16.0, power)
         for e, clamp in ((1.0, False), (1.0, True), (0.3, True)):
             found = resolve_impact(M, J, v, e, clamp=clamp)
-            change, (low, high) = exact_change(M, v, found.velocity), found.energy_interval
+            change = exact_change(M, v, found.velocity)
+            (low, high) = found.energy_interval
             assert Fraction(low) <= change <= Fraction(high)
             assert change <= 0 or not clamp
             if e == 1.0 and power in (0, 300):  # as narrow as double-double sums of these products
@@ -156,12 +161,11 @@ def test_energy_is_enclosed_where_its_squares_leave_the_range(power: int, skew: 
 def test_energy_is_enclosed_where_only_halves_of_its_products_overflow() -> None:
     """Δ A s is finite, but not the product of the rounded halves of its factors; a bound of −∞ is
     not accepted."""
-    M, v = (
-        np.array([[float.fromhex("0x1.492a43be43642p-1")]]),
-        np.array([float.fromhex("-0x1.c386bbc204f8ap+511")]),
-    )
+    M = np.array([[float.fromhex("0x1.492a43be43642p-1")]])
+    v = np.array([float.fromhex("-0x1.c386bbc204f8ap+511")])
     found = resolve_impact(M, np.eye(1), v, 0.0)
-    change, (low, high) = exact_change(M, v, found.velocity), found.energy_interval
+    change = exact_change(M, v, found.velocity)
+    (low, high) = found.energy_interval
     assert Fraction(low) <= change <= Fraction(high) < 0
     assert abs(Fraction(found.energy_change) - change) <= Fraction(math.ulp(found.energy_change))
 
@@ -179,7 +183,9 @@ def test_units_by_powers_of_two_change_no_bit(
     """q' = 2^−s q, rows times 2^r, time and mass in other units: results differ by their units
     alone."""
     M, J, v = problem(seed, d=5, c=4)
-    J, s, r = np.vstack((J, J[0] + J[1], 0.0 * J[0])), np.array(powers[:5]), powers[5]
+    J = np.vstack((J, J[0] + J[1], 0.0 * J[0]))
+    s = np.array(powers[:5])
+    r = powers[5]
     plain = resolve_impact(M, J, v, 0.4, clamp=clamp)
     other = resolve_impact(
         np.ldexp(M, s[:, None] + s + 2 * mass),
@@ -228,15 +234,14 @@ def test_of_a_mass_matrix_with_rounding_in_it_the_symmetric_part_counts() -> Non
 def test_many_at_once_are_those_one_by_one_bit_for_bit(
     seed: int, d: int, c: int, clamp: bool, budget: int | None, tolerance: float | None
 ) -> None:
-    rng, options = (
-        np.random.default_rng(seed),
-        {"clamp": clamp, "budget": budget, "rank_tolerance": tolerance},
-    )
+    rng = np.random.default_rng(seed)
+    options = {"clamp": clamp, "budget": budget, "rank_tolerance": tolerance}
     root = rng.normal(size=(5, d, d))
     masses = root @ root.transpose(0, 2, 1) + 10.0 ** rng.uniform(-9, 0) * np.eye(d)
     rows = rng.normal(size=(5, c, d)) * 10.0 ** rng.uniform(-6, 6, (5, c, 1))
     rows[:, 2:4] = rows[:, 1:2]
-    v, e = rng.normal(size=(5, d)) * 10.0 ** rng.uniform(-300, 9, (5, 1)), rng.uniform(-1.0, 1.0, 5)
+    v = rng.normal(size=(5, d)) * 10.0 ** rng.uniform(-300, 9, (5, 1))
+    e = rng.uniform(-1.0, 1.0, 5)
     found: Any = resolve_impacts(masses, rows, v, e, **options)  # type: ignore[arg-type]
     for k in range(5):
         single = resolve_impact(masses[k], rows[k], v[k], e[k], **options)  # type: ignore[arg-type]
@@ -258,7 +263,8 @@ def test_many_at_once_are_those_one_by_one_bit_for_bit(
 # --- how an impact ends; ranks and tolerances
 # ------------------------------------------------------------------------
 
-V, NEAR = [-1.0, -2.0, 3.0], [[1.0, 0.0, 0.0], [1.0, 1e-4, 0.0]]
+V = [-1.0, -2.0, 3.0]
+NEAR = [[1.0, 0.0, 0.0], [1.0, 1e-4, 0.0]]
 
 
 @pytest.mark.parametrize(
@@ -303,10 +309,12 @@ def test_a_budget_takes_the_rows_that_close_fastest_and_each_takes_energy() -> N
         rows = (
             np.linalg.cholesky(M) @ np.linalg.qr(np.random.default_rng(seed).normal(size=(5, 4)))[0]
         ).T
-        speeds, change = rows @ v, 0.0
+        speeds = rows @ v
+        change = 0.0
         rows = rows * [[1.0], [20.0], [0.3], [4.0]]
         for budget in range(5):
-            found, expected = resolve_impact(M, rows, v, 0.5, budget=budget), speeds.copy()
+            found = resolve_impact(M, rows, v, 0.5, budget=budget)
+            expected = speeds.copy()
             expected[np.argsort(-np.abs(speeds))[:budget]] *= -0.5
             np.testing.assert_allclose(
                 rows @ found.velocity / [1.0, 20.0, 0.3, 4.0], expected, atol=1e-12
@@ -335,10 +343,8 @@ def test_unequal_restitution_is_poissons_law(seed: int, d: int, c: int) -> None:
     """As the reference solves its two problems; what dependent rows leave open is still passive and
     only pushes."""
     M, J, v = problem(seed, d, c)
-    J, rng = (
-        J * 10.0 ** np.random.default_rng(seed).uniform(-2, 2, (c, 1)),
-        np.random.default_rng(seed + 1),
-    )
+    J = J * 10.0 ** np.random.default_rng(seed).uniform(-2, 2, (c, 1))
+    rng = np.random.default_rng(seed + 1)
     J[-1] *= rng.random() < 0.8
     e = rng.uniform(0.0, 1.0, c)
     found = resolve_impact(M, J, v, e)
@@ -352,7 +358,8 @@ def test_unequal_restitution_is_poissons_law(seed: int, d: int, c: int) -> None:
     )
     if np.linalg.matrix_rank(J[length > 0.0]) == np.count_nonzero(length):
         truth = poisson(ImpactProblem.from_impact(M, J[length > 0.0], v, e[length > 0.0]))
-        v_plus, p = truth.velocity, truth.impulse
+        v_plus = truth.velocity
+        p = truth.impulse
         np.testing.assert_allclose(found.velocity, v_plus, atol=1e-8 * np.abs(v).max())
         np.testing.assert_allclose(found.impulses[length > 0.0], p, atol=1e-7 * (p.max() + size))
         assert found.rank == np.count_nonzero(p > 1e-9 * p.max(initial=0.0))
@@ -367,7 +374,8 @@ def test_many_contacts_that_all_face_the_motion_are_settled() -> None:
         rows /= np.linalg.norm(rows, axis=1)[:, None]
         v = -0.3 * rows.sum(axis=0) + rng.normal(size=10)
         found = resolve_impact(np.eye(10), rows, v, 0.0, method="poisson")
-        speeds, size = rows @ found.velocity, np.linalg.norm(v)
+        speeds = rows @ found.velocity
+        size = np.linalg.norm(v)
         assert found.impulses.min() >= 0.0 and speeds.min() >= -1e-11 * size
         assert np.abs(found.impulses * speeds).max() <= 1e-10 * size * (1.0 + found.impulses.max())
 
@@ -425,7 +433,8 @@ def test_the_order_of_four_corners_does_not_matter(v: list[float], every: int) -
 
 def test_a_contact_that_just_touches_after_compression_shares_the_impact() -> None:
     """It is the last row; the first two are opposed. v⁺ from rationals."""
-    rows, e = [[-2.0, 1.0], [2.0, -1.0], [1.0, -1.0], [0.0, -1.0]], [0.0, 0.0, 0.5, 1.0]
+    rows = [[-2.0, 1.0], [2.0, -1.0], [1.0, -1.0], [0.0, -1.0]]
+    e = [0.0, 0.0, 0.5, 1.0]
     found = resolve_impact([[2.0, -2.0], [-2.0, 14.0]], rows, [-4.0, 0.0], e)
     np.testing.assert_allclose(found.velocity, [-0.1184, -0.2368], atol=1e-15)
 
@@ -437,7 +446,8 @@ def test_order_scale_and_copies_of_dependent_rows_do_not_matter(seed: int, d: in
     rank = int(rng.integers(1, d + 1))
     rows = rng.integers(-2, 3, (c, rank)) @ rng.normal(size=(rank, d))
     e = rng.choice([0.0, 0.3, 0.8, 1.0], c)
-    order, copies = rng.permutation(c), rng.integers(0, c, 2)
+    order = rng.permutation(c)
+    copies = rng.integers(0, c, 2)
     plain = resolve_impact(M, rows, v, e, method="poisson")
     scaled = np.vstack([rows, rows[copies]]) * 10.0 ** rng.uniform(-3, 3, (c + 2, 1))
     chosen = np.append(order, [c, c + 1])
@@ -511,10 +521,15 @@ def test_poisson_and_friction_are_refined_for_the_given_mass_matrix(
 def rubbing(seed: int, most: float = 2.0) -> tuple[Any, ...]:
     """M, J, T, v, e, μ up to `most`: couplings strong enough that limits may never settle."""
     rng = np.random.default_rng(seed)
-    d, c, m = int(rng.integers(2, 8)), int(rng.integers(1, 5)), int(rng.integers(1, 3))
+    d = int(rng.integers(2, 8))
+    c = int(rng.integers(1, 5))
+    m = int(rng.integers(1, 3))
     root = rng.normal(size=(d, d))
-    rows, tangents, v = rng.normal(size=(c, d)), rng.normal(size=(c, m, d)), rng.normal(size=d)
-    e, mu = float(rng.choice([0.0, 0.4, 1.0])), rng.uniform(0.0, most, c)
+    rows = rng.normal(size=(c, d))
+    tangents = rng.normal(size=(c, m, d))
+    v = rng.normal(size=d)
+    e = float(rng.choice([0.0, 0.4, 1.0]))
+    mu = rng.uniform(0.0, most, c)
     return root @ root.T + 0.1 * np.eye(d), rows, tangents, v, e, mu
 
 
@@ -525,8 +540,11 @@ def test_friction_obeys_coulomb_keeps_restitution_and_gains_nothing(most: float)
     seen: dict[str, int] = {"complete": 0, "reduced": 0, "scaled": 0, "obeyed": 0}
     for seed in range(300):
         M, J, T, v, e, mu = rubbing(seed, most)
-        found, plain = resolve_frictional_impact(M, J, T, v, e, mu), resolve_impact(M, J, v, e)
-        p, p_t, energy = found.impulses, found.tangential_impulses, float(v @ M @ v)
+        found = resolve_frictional_impact(M, J, T, v, e, mu)
+        plain = resolve_impact(M, J, v, e)
+        p = found.impulses
+        p_t = found.tangential_impulses
+        energy = float(v @ M @ v)
         assert found.energy_change <= 0.0
         scale = np.abs(J) @ (np.abs(v) + np.abs(found.velocity) + np.abs(plain.velocity))
         assert np.all(np.abs(J @ (found.velocity - plain.velocity)) <= 1e-9 * scale)
@@ -602,7 +620,8 @@ def test_a_lever_that_sticks_stops_dead() -> None:
 def test_friction_that_loads_its_own_contact_is_solved_exactly() -> None:
     """A contact that slides while μ ∂p_n/∂p_t is 0.9: p_t = −μ p_n, which plain rounds approach by
     a tenth each."""
-    jacobian, M = np.array([[1.0, 0.0, 0.9], [0.0, 1.0, 1.0]]), np.diag([1.0, 1.0, 0.5])
+    jacobian = np.array([[1.0, 0.0, 0.9], [0.0, 1.0, 1.0]])
+    M = np.diag([1.0, 1.0, 0.5])
     W = jacobian @ np.linalg.solve(M, jacobian.T)
     mu = 0.9 * W[1, 1] / W[0, 1]
     found = resolve_frictional_impact(M, jacobian[1:], jacobian[:1], [50.0, -1.0, 0.0], 0.0, mu)
@@ -643,7 +662,8 @@ def test_rows_of_friction_may_differ_in_size(decades: float) -> None:
     for seed in range(60):
         M, J, T, v, e, mu = rubbing(seed, 0.5)
         sizes = np.logspace(-decades, decades, len(J))
-        rows, tangents = J * sizes[:, None], T * sizes[:, None, None]
+        rows = J * sizes[:, None]
+        tangents = T * sizes[:, None, None]
         plain = resolve_frictional_impact(M, J, T, v, e, mu)
         found = resolve_frictional_impact(M, rows, tangents, v, e, mu)
         pushed = found.impulses @ rows + np.tensordot(found.tangential_impulses, tangents, 2)

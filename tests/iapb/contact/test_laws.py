@@ -121,10 +121,8 @@ def test_spreading_delivers_the_prescribed_velocity_for_plastic_impacts_only(
 
 @pytest.mark.parametrize("e", [0.0, 0.3, 1.0])
 def test_equal_restitution_changes_no_bit_wherever_it_is_written(e: float) -> None:
-    plain, walls = (
-        simulate(PEG.with_values({"contact.restitution": e})),
-        [wall.name for wall in PEG.walls],
-    )
+    plain = simulate(PEG.with_values({"contact.restitution": e}))
+    walls = [wall.name for wall in PEG.walls]
     of_walls = {f"walls.{name}.restitution": e for name in walls}
     for values in (
         of_walls,
@@ -178,7 +176,8 @@ def test_a_box_on_a_hard_and_a_soft_tile_turns_whichever_comes_first(forces: str
     """Its left side bounces. Friction changes no normal velocity of the contacts that stay."""
     contact = {"forces": forces, "stiffness": 1e4, "damping": 10.0, "friction": 0.3}
     scene, turned = (scene_of([BOX], TILES[::way], contact=contact) for way in (1, -1))
-    first, other = simulate(scene).impacts.v_plus[0], simulate(turned).impacts.v_plus[0]
+    first = simulate(scene).impacts.v_plus[0]
+    other = simulate(turned).impacts.v_plus[0]
     np.testing.assert_allclose(first, other, atol=1e-12)
     assert first[2] < -1.0 and 0.0 < first[1] < 0.8
     if forces == "paper":

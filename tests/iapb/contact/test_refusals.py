@@ -15,7 +15,8 @@ from iapb.errors import ArgumentError
 from iapb.scene import find_scene, load_scene
 from iapb.system import System
 
-NAN, INF = float("nan"), float("inf")
+NAN = float("nan")
+INF = float("inf")
 ONE = {
     "mass_matrix": [[2.0, 0.5], [0.5, 1.0]],
     "contact_jacobian": np.eye(2),

@@ -28,7 +28,8 @@ def sliders(seed: int, count: int | None = None, **contact: Any) -> Scene:
     would not be linear.
     """
     rng = np.random.default_rng(seed)
-    count, rate = count or int(rng.integers(1, 9)), float(10.0 ** rng.uniform(2.0, 4.0))
+    count = count or int(rng.integers(1, 9))
+    rate = float(10.0 ** rng.uniform(2.0, 4.0))
     places = np.cumsum(rng.uniform(0.0185, 0.0215, count))
     bodies = [
         {
@@ -66,11 +67,9 @@ def made(run: Run) -> tuple[float, float]:
     inside a wall, has an energy that no step has made. Rounding of the gaps, 1e-16 m of 0.1 m,
     times K is taken off.
     """
-    K, table, kinetic = (
-        run.scene_resolved["contact"]["stiffness"],
-        run.contacts,
-        run.energy["kinetic"],
-    )
+    K = run.scene_resolved["contact"]["stiffness"]
+    table = run.contacts
+    kinetic = run.energy["kinetic"]
     pair = list(
         zip(
             table.body_a.tolist(),
@@ -142,17 +141,18 @@ def test_implicit_forces_solve_the_complementarity_problem(seed: int) -> None:
             "damping": float(10.0 ** rng.uniform(0, 4)),
         },
     )
-    run, m, h, K = (
-        simulate(scene, Penalty()),
-        System(scene).mechanism,
-        1e-3,
-        scene.contact.stiffness,
-    )
-    c, k, some = run.contacts, K * h + scene.contact.damping, 0
+    run = simulate(scene, Penalty())
+    m = System(scene).mechanism
+    h = 1e-3
+    K = scene.contact.stiffness
+    c = run.contacts
+    k = K * h + scene.contact.damping
+    some = 0
     for i in range(*c.offsets[:2]):
         J = m.point_jacobian(run.q[0], int(c.body_a[i]), c.point[i])
         J = J - m.point_jacobian(run.q[0], int(c.body_b[i]), c.point[i]) if c.body_b[i] >= 0 else J
-        row, p = c.normal[i] @ J, c.normal_force[i]
+        row = c.normal[i] @ J
+        p = c.normal_force[i]
         size = np.abs(row) @ np.abs(run.v[1]) + K * abs(c.gap[i]) / k
         opened = row @ run.v[1] + (p + K * c.gap[i]) / k
         assert p >= 0.0 and opened >= -1e-7 * size
@@ -163,7 +163,8 @@ def test_implicit_forces_solve_the_complementarity_problem(seed: int) -> None:
 
 def on_slope(degrees: float, mu: float, v: float = 0.0, **contact: Any) -> Scene:
     """A box on a level floor, under tilted gravity, at speed v along it."""
-    a, sag = math.radians(degrees), 5e-4 if "stiffness" in contact else 0.0
+    a = math.radians(degrees)
+    sag = 5e-4 if "stiffness" in contact else 0.0
     body = {
         "name": "box",
         "joint": "planar",

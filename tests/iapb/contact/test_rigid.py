@@ -67,7 +67,8 @@ def test_a_stack_without_friction_stands_for_twenty_seconds(name: str, rate: int
 
 
 def coin(place: list[float], turn: list[float], velocity: list[float]) -> Values:
-    mass, (a, b) = 0.01, (0.02, 0.004)
+    mass = 0.01
+    (a, b) = (0.02, 0.004)
     moments = [mass * (a**2 + b**2) / 12, mass * (a**2 + b**2) / 12, mass * a**2 / 6]
     shape = {"kind": "box", "size": [a, a, b]}
     given = {"name": "coin", "joint": "free_flyer", "mass": mass, "inertia": moments}
@@ -149,7 +150,8 @@ def tiles(count: int, width: float, space: bool) -> list[Values]:
 
 
 def thrown(shape: str, space: bool, speed: float, drop: float) -> Values:
-    mass, half = 0.2, 0.025
+    mass = 0.2
+    half = 0.025
     size = [0.1, 0.08, 0.05] if space else [0.1, 0.05]
     kind = {"box": {"kind": "box", "size": size}}
     kind["ball"] = {"kind": "sphere" if space else "circle", "radius": half}

@@ -26,7 +26,8 @@ ROUNDING = 1e-9  # of sums of a few dozen products, in units of the largest
 def pit(space: bool, **contact: Any) -> Scene:
     """Discs, rectangles and polygons (balls and cuboids) thrown into a pit with a floor and two
     slopes."""
-    rng, n = np.random.default_rng(7), 3 if space else 2
+    rng = np.random.default_rng(7)
+    n = 3 if space else 2
     kinds: list[Values] = (
         [
             {"kind": "box", "size": [0.2, 0.16, 0.12]},
@@ -254,10 +255,18 @@ class Step:
     ) -> None:
         # by name: gaps, as they were linear over the step; how far apart points get that touched,
         # Δt J v, what they have moved since they stick (None: they slid), whether that is certain
-        self.expected, self.linear = expected, dict[Any, float]()
-        self.stuck, self.sticks = stuck, dict[Any, Any]()
-        self.system, self.law, self.run, self.k, self.m = system, law, run, k, system.mechanism
-        self.scene, self.q, self.v = system.scene, run.q[k], run.v[k]
+        self.expected = expected
+        self.linear = dict[Any, float]()
+        self.stuck = stuck
+        self.sticks = dict[Any, Any]()
+        self.system = system
+        self.law = law
+        self.run = run
+        self.k = k
+        self.m = system.mechanism
+        self.scene = system.scene
+        self.q = run.q[k]
+        self.v = run.v[k]
         self.table = {
             name: getattr(run.contacts, name)[slice(*run.contacts.offsets[k : k + 2])]
             for name in (
@@ -309,7 +318,8 @@ class Step:
         """Whether contact c ends when its body is lifted out of a support of the same two bodies."""
         if c.bodies != support.bodies or c.normal @ support.normal > 1.0 - 1e-6:
             return False
-        q, start = self.q.copy(), self.m.arrays.q_start[c.bodies[0]]
+        q = self.q.copy()
+        start = self.m.arrays.q_start[c.bodies[0]]
         axes = 3 if paper.in_space(self.scene) else 2
         q[start : start + axes] -= support.gap * support.normal[:axes]
         lifted = self.system.contacts_at(q, -1e-9)
@@ -346,9 +356,11 @@ class Step:
 
     def rows(self, chosen: list[int]) -> tuple[np.ndarray, list[int]]:
         """J_c and the contact of each row: (11), (12), or both rows of (13)-(14)."""
-        rows, owner = [], []
+        rows = []
+        owner = []
         for i in chosen:
-            c, both = self.contacts[i], self.scene.contact.self_collision_rows == "per_body"
+            c = self.contacts[i]
+            both = self.scene.contact.self_collision_rows == "per_body"
             if both and c.bodies[1] >= 0 and c.stop is None:
                 rows += [
                     c.normal @ self.m.point_jacobian(self.q, body, c.point) for body in c.bodies
@@ -367,9 +379,11 @@ class Step:
         With implicit contact several contacts only push, and those that push meet −e γ⁻.
         """
         values = [paper.own_values(self.scene, self.contacts[i]) for i in chosen]
-        e, log = np.array([value[0] for value in values]), self.run.impacts
+        e = np.array([value[0] for value in values])
+        log = self.run.impacts
         if self.law.friction_in_impacts and self.only_push(chosen):
-            after, p = log.v_plus[line, dofs], self.table["impulse"][chosen]
+            after = log.v_plus[line, dofs]
+            p = self.table["impulse"][chosen]
             left = np.abs(J @ after + e * (J @ v))[p > 0.0]
             assert p.min() >= 0.0 and left.max(initial=0.0) <= ROUNDING * np.abs(v).max()
             return after, p, log.friction_share[line], log.solved[line]
@@ -405,22 +419,24 @@ class Step:
             else paper.linked(self.m, [self.contacts[i] for i in self.collides])
         )
         roots = sorted({self.of(island, self.contacts[i]) for i in self.collides})
-        log, lines = self.run.impacts, np.flatnonzero(self.run.impacts.step == self.k)
+        log = self.run.impacts
+        lines = np.flatnonzero(self.run.impacts.step == self.k)
         assert log.group[lines].tolist() == roots
-        v_plus, impulse, spreading, p_of = (
-            self.v.copy(),
-            np.zeros(self.m.nv),
-            set[int](),
-            np.zeros(len(self.contacts)),
-        )
+        v_plus = self.v.copy()
+        impulse = np.zeros(self.m.nv)
+        spreading = set[int]()
+        p_of = np.zeros(len(self.contacts))
         for line, root in zip(lines, roots, strict=True):
             trees = [t for t, first in enumerate(island) if first == root]
             dofs = np.concatenate([np.arange(*self.m.tree_dofs[t]) for t in trees])
             chosen = [i for i in self.collides if self.of(island, self.contacts[i]) == root]
             J, owner = self.rows(chosen)
-            J, M, v = J[:, dofs], self.m.mass_matrix(self.q)[np.ix_(dofs, dofs)], self.v[dofs]
+            J = J[:, dofs]
+            M = self.m.mass_matrix(self.q)[np.ix_(dofs, dofs)]
+            v = self.v[dofs]
             after, p, kept, solved = self.resolved(J, M, v, chosen, dofs, line)
-            asked, share = M @ (after - v), 1.0
+            asked = M @ (after - v)
+            share = 1.0
             if scales:
                 limit = np.full(self.m.nv, np.inf)
                 limit[slice(*self.system.tool_dofs)] = self.scene.device.force_limit
@@ -429,7 +445,8 @@ class Step:
                 assert np.all(np.abs(log.impulse[line, dofs]) / self.system.dt <= limit[dofs])
             size = np.abs(self.v).max()
             np.testing.assert_allclose(log.v_minus[line], v_plus, atol=ROUNDING * size)
-            v_plus[dofs], impulse[dofs] = v + share * (after - v), share * asked
+            v_plus[dofs] = v + share * (after - v)
+            impulse[dofs] = share * asked
             np.testing.assert_allclose(log.v_plus[line], v_plus, atol=ROUNDING * size)
             spreading |= set(trees) if share < 1.0 and self.law.rendering == "spread" else set()
             for row, i in enumerate(owner):
@@ -467,22 +484,30 @@ class Step:
     def check_forces(self, v_plus: np.ndarray) -> None:
         """(5), (6) at what does not collide; or the implicit forces and Coulomb's law at the end of
         the step."""
-        given, after = self.scene.contact, self.run.v[self.k + 1]
-        penalty, friction, h = np.zeros(self.m.nv), np.zeros(self.m.nv), self.system.dt
+        given = self.scene.contact
+        after = self.run.v[self.k + 1]
+        penalty = np.zeros(self.m.nv)
+        friction = np.zeros(self.m.nv)
+        h = self.system.dt
         for i, (c, J) in enumerate(zip(self.contacts, self.jacobians, strict=True)):
-            normal, drag = self.table["normal_force"][i], self.table["friction_force"][i]
-            penalty, friction = penalty + J.T @ c.normal * normal, friction + J.T @ drag
+            normal = self.table["normal_force"][i]
+            drag = self.table["friction_force"][i]
+            penalty = penalty + J.T @ c.normal * normal
+            friction = friction + J.T @ drag
             force, explicit = paper.resting(self.scene, c, J, v_plus)
-            mu, size = paper.own_values(self.scene, c)[1], given.stiffness * 1e-3
+            mu = paper.own_values(self.scene, c)[1]
+            size = given.stiffness * 1e-3
             if given.forces == "implicit":
                 soft = given.stiffness * h + given.damping
-                bend, speed = c.gap - self.expected.get(c.name, c.gap), c.normal @ J @ after
+                bend = c.gap - self.expected.get(c.name, c.gap)
+                speed = c.normal @ J @ after
                 bend = bend if abs(bend) > 1e-12 else 0.0
                 force = max(0.0, -given.stiffness * c.gap - soft * (speed + bend / h))
                 if normal > 0.0:
                     self.linear[c.name] = c.gap + h * speed
             elif self.states[self.of(self.group, c)] == COLLIDING:
-                force, explicit = 0.0, np.zeros(3)
+                force = 0.0
+                explicit = np.zeros(3)
             if given.forces == "implicit" and normal != pytest.approx(
                 force, rel=1e-6, abs=1e-6 * size
             ):
@@ -492,7 +517,8 @@ class Step:
             if given.forces == "paper":
                 np.testing.assert_allclose(drag, explicit, atol=ROUNDING * size)
                 continue
-            slip, limit = J @ after - (c.normal @ J @ after) * c.normal, mu * max(normal, 0.0)
+            slip = J @ after - (c.normal @ J @ after) * c.normal
+            limit = mu * max(normal, 0.0)
             assert (
                 np.linalg.norm(drag) <= limit * (1.0 + 2e-3) and abs(drag @ c.normal) < 1e-9 * size
             )
@@ -526,7 +552,8 @@ class Step:
         else:
             np.testing.assert_allclose(lost, 0.0, atol=1e-6)
             # points that touch follow arcs, J v their tangents: an angle of |ω| Δt
-            drag, turned = self.run.friction_force[self.k], h * np.abs(after).max()
+            drag = self.run.friction_force[self.k]
+            turned = h * np.abs(after).max()
             most = 1e-9 + turned * np.abs(drag) @ np.abs(after)
             assert drag @ after <= most or given.forces == "paper"
 
@@ -541,9 +568,11 @@ class Step:
             return turn[body], origin[body]
 
         def apart(q: np.ndarray) -> np.ndarray:
-            ends, angles = [], []
+            ends = []
+            angles = []
             for body in (ours, theirs):
-                (turn, origin), (turned, moved) = placed(body, self.q), placed(body, q)
+                (turn, origin) = placed(body, self.q)
+                (turned, moved) = placed(body, q)
                 ends.append(moved + turned @ turn.T @ (c.point - origin))
                 angles.append(Rotation.from_matrix(turned @ turn.T).as_rotvec())
             found = ends[0] - ends[1]
@@ -554,7 +583,9 @@ class Step:
 
     def check_motion(self, v_plus: np.ndarray) -> None:
         """(7) with the record's forces, by semi-implicit Euler."""
-        h, run, k = self.system.dt, self.run, self.k
+        h = self.system.dt
+        run = self.run
+        k = self.k
         force = (
             run.hand_force[k] + run.coupling_force[k] + run.penalty_force[k] + run.friction_force[k]
         )
@@ -571,14 +602,14 @@ class Step:
 @pytest.mark.parametrize("name", CASES)
 def test_every_step_is_the_papers(name: str) -> None:
     scene, law = CASES[name]
-    run, system = simulate(scene, law), System(scene)
-    law, before, spreading, seen = (
-        law.within(system.scene),
-        list[paper.Contact](),
-        set[int](),
-        set[int](),
-    )
-    expected, stuck = dict[Any, float](), dict[Any, Any]()
+    run = simulate(scene, law)
+    system = System(scene)
+    law = law.within(system.scene)
+    before = list[paper.Contact]()
+    spreading = set[int]()
+    seen = set[int]()
+    expected = dict[Any, float]()
+    stuck = dict[Any, Any]()
     assert run.complete
     for k in range(run.steps):
         step = Step(system, law, run, k, before, spreading, expected, stuck)
@@ -587,8 +618,10 @@ def test_every_step_is_the_papers(name: str) -> None:
         step.check_forces(v_plus)
         if law.integrator == "semi_implicit_euler":
             step.check_motion(v_plus)
-        before, seen = step.contacts, seen | set(step.states)
-        expected, stuck = step.linear, step.sticks
+        before = step.contacts
+        seen = seen | set(step.states)
+        expected = step.linear
+        stuck = step.sticks
     assert COLLIDING in seen if law.impulses else RESTING in seen
     assert RESTING in seen or "cradle" in name
     assert getattr(law, "rendering", "full") == "full" or (run.impacts.scale < 1.0).any()

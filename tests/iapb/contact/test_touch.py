@@ -17,7 +17,8 @@ from iapb.simulation import Simulation, simulate
 from verification.certificate import certify
 
 G = 9.81
-WIDTH, HEIGHT = 0.1, 0.06
+WIDTH = 0.1
+HEIGHT = 0.06
 CORNERS = 0.5 * np.array([[WIDTH, HEIGHT], [-WIDTH, HEIGHT], [-WIDTH, -HEIGHT], [WIDTH, -HEIGHT]])
 INERTIA = (WIDTH**2 + HEIGHT**2) / 12.0
 # Some ten impacts multiply the rounding of a touch (1e-15 m) by ten each at worst.
@@ -45,7 +46,8 @@ bodies:
 
 def heights(q: NDArray[np.float64], v: NDArray[np.float64], t: float) -> NDArray[np.float64]:
     """Return the heights of the four corners after t seconds of flight."""
-    y, angle = q[1] + t * v[1] - 0.5 * G * t * t, q[2] + t * v[2]
+    y = q[1] + t * v[1] - 0.5 * G * t * t
+    angle = q[2] + t * v[2]
     return np.asarray(y + math.sin(angle) * CORNERS[:, 0] + math.cos(angle) * CORNERS[:, 1])
 
 
@@ -54,7 +56,10 @@ def tossed(
 ) -> tuple[NDArray[np.float64], int]:
     """Return where the box is in the end, and the number of its impacts: parabolas between touches
     that a root finder finds."""
-    q, v, left, impacts = state[:3].copy(), state[3:].copy(), seconds, 0
+    q = state[:3].copy()
+    v = state[3:].copy()
+    left = seconds
+    impacts = 0
     while True:
         times = np.linspace(0.0, left, 4000)
         low = np.array([heights(q, v, t) for t in times]) < 0.0
@@ -72,7 +77,8 @@ def tossed(
         if corner < 0:
             return q, impacts
         impacts += 1
-        c, s = math.cos(q[2]), math.sin(q[2])
+        c = math.cos(q[2])
+        s = math.sin(q[2])
         row = np.array([0.0, 1.0, c * CORNERS[corner, 0] - s * CORNERS[corner, 1]])
         along = np.array([1.0, 0.0, -s * CORNERS[corner, 0] - c * CORNERS[corner, 1]])
         v = v + coulomb(np.stack([row, along]), v, restitution, friction)
@@ -83,7 +89,8 @@ def coulomb(
 ) -> NDArray[np.float64]:
     """Return the change of v by one impact with Coulomb's law: it sticks, or slides one way."""
     moved = rows / [1.0, 1.0, INERTIA]
-    inverse, before = rows @ moved.T, rows @ v
+    inverse = rows @ moved.T
+    before = rows @ v
     due = -np.array([(1.0 + restitution) * before[0], before[1]])
     normal, side = np.linalg.solve(inverse, due)
     if abs(side) <= friction * normal:
@@ -98,7 +105,8 @@ def coulomb(
 
 def states(count: int, seed: int) -> list[NDArray[np.float64]]:
     rng = np.random.default_rng(seed)
-    least, most = [0.0, 0.1, 0.0, -1.0, -1.0, -10.0], [0.0, 0.4, 6.28, 1.0, 1.0, 10.0]
+    least = [0.0, 0.1, 0.0, -1.0, -1.0, -10.0]
+    most = [0.0, 0.4, 6.28, 1.0, 1.0, 10.0]
     return [rng.uniform(least, most) for _ in range(count)]
 
 
@@ -200,7 +208,8 @@ def test_another_group_keeps_its_bits() -> None:
 
 def test_single_steps_give_the_bits_of_one_run() -> None:
     text = toss_text(states(1, seed=5)[0], 500.0)
-    run, simulation = simulate(scene_from_text(text)), Simulation(scene_from_text(text))
+    run = simulate(scene_from_text(text))
+    simulation = Simulation(scene_from_text(text))
     for k in range(run.steps):
         result = simulation.step()
         assert (result.q == run.q[k + 1]).all() and (result.v == run.v[k + 1]).all()
@@ -257,7 +266,8 @@ walls: [{{name: plate, kind: box, size: [0.01, 1], center: [0, 0]}}]
 
 @pytest.mark.parametrize("speed", [100.0, 300.0, 900.0])
 def test_a_bullet_stops_at_the_plate(speed: float) -> None:
-    run, touch = plate(speed), 0.54 / speed
+    run = plate(speed)
+    touch = 0.54 / speed
     assert run.q[-1, 0] == pytest.approx(-0.01 - 0.5 * speed * (0.01 - touch), rel=1e-9)
     assert not run.distrust
 

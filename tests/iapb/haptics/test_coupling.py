@@ -21,12 +21,14 @@ def pair_energies(damping, steps):
     """Energy of tool, device and the spring between them [J], no hand, started 2 cm and 0.1 rad
     apart."""
     simulation = Simulation(FAR.with_values({"hand.force": [0, 0, 0]}), Penalty(), FOUR_CHANNEL)
-    state, port = simulation.state, simulation.port
+    state = simulation.state
+    port = simulation.port
     port.device_q[:] += [0.02, -0.01, 0.1]
     port.damping[:] *= damping
     energies = []
     for _ in range(steps):
-        stretch, mass = port.device_q - state.q, state.mass_matrix
+        stretch = port.device_q - state.q
+        mass = state.mass_matrix
         kinetic = state.v @ mass @ state.v + port.device_v @ mass @ port.device_v
         energies.append(
             0.5 * (kinetic + np.sum(np.multiply(FOUR_CHANNEL.stiffness, stretch * stretch)))
@@ -48,7 +50,8 @@ def test_with_its_damping_reversed_the_pair_gains_energy():
 @pytest.mark.parametrize("coupling", [FOUR_CHANNEL, UNILATERAL], ids=lambda c: c.name)
 def test_in_free_motion_tool_and_device_go_together(coupling):
     simulation = Simulation(FAR, Penalty(), coupling)
-    state, port = simulation.state, simulation.port
+    state = simulation.state
+    port = simulation.port
     for _ in range(100):
         simulation.step()
     assert port.device_q == pytest.approx(state.q, abs=1e-12)

@@ -39,10 +39,8 @@ def test_momentum_changes_by_the_impulse_of_the_forces(forces):
 
 @given(forces, st.integers(0, 5))
 def test_delay_shifts_forces_and_readings_by_its_steps(forces, delay):
-    late, prompt = (
-        SimulatedDevice(MASS, REST, dt=DT, delay=delay),
-        SimulatedDevice(MASS, REST, dt=DT),
-    )
+    late = SimulatedDevice(MASS, REST, dt=DT, delay=delay)
+    prompt = SimulatedDevice(MASS, REST, dt=DT)
     history = [prompt.q]
     for force in forces:
         late.apply(force)
@@ -58,10 +56,8 @@ def test_delay_shifts_forces_and_readings_by_its_steps(forces, delay):
 @given(forces)
 def test_actuators_clip_and_the_hand_does_not(forces):
     limit = np.array([15.0, 15.0, 1.0])
-    device, clipped = (
-        SimulatedDevice(MASS, REST, dt=DT, force_limit=limit),
-        SimulatedDevice(MASS, REST, dt=DT),
-    )
+    device = SimulatedDevice(MASS, REST, dt=DT, force_limit=limit)
+    clipped = SimulatedDevice(MASS, REST, dt=DT)
     device.hand_force = clipped.hand_force = np.array([50.0, 0.0, 0.0])
     for force in forces:
         device.apply(force)
@@ -114,18 +110,19 @@ device: {{force_limit: [3, 2, 0.1], damping: {damping}}}
 def test_the_device_obeys_its_equation_of_motion(center: str, damping: tuple[float, ...]) -> None:
     """M(q) a + B(q, v) = F_hand + F_actuators − b v; the new velocity moves it; the clock counts
     the step."""
-    system, rng = system_of(center, str(list(damping))), np.random.default_rng(0)
+    system = system_of(center, str(list(damping)))
+    rng = np.random.default_rng(0)
     port = system.make_port(FourChannel(*GAINS))
-    device, world, state = (
-        system.device_mechanism(),
-        system.world_under(Penalty()),
-        system.make_state(),
-    )
+    device = system.device_mechanism()
+    world = system.world_under(Penalty())
+    state = system.make_state()
     for step in range(5):
         q = device.integrate(device.neutral(), rng.normal(size=3))
         v, hand, actuators = rng.normal(size=(3, 3))
-        port.device_q[:], port.device_v[:] = q, v
-        port.device_hand_force[:], port.device_force[:] = hand, actuators
+        port.device_q[:] = q
+        port.device_v[:] = v
+        port.device_hand_force[:] = hand
+        port.device_force[:] = actuators
         assert move_device(world, state, port)
         force = hand + actuators - np.array(damping) * v - device.bias(q, v)
         moved = v + world.dt * np.linalg.solve(device.mass_matrix(q), force)
@@ -133,28 +130,33 @@ def test_the_device_obeys_its_equation_of_motion(center: str, damping: tuple[flo
         assert port.device_q == pytest.approx(device.integrate(q, moved, world.dt), abs=1e-13)
         assert port.clock[0] == step + 1
     for k in range(3):
-        port.device_q[:], port.device_v[:], port.device_force[:] = device.neutral(), 0.0, 0.0
+        port.device_q[:] = device.neutral()
+        port.device_v[:] = 0.0
+        port.device_force[:] = 0.0
         port.device_force[k] = 1e200
         assert not move_device(world, state, port)  # it left all bounds
 
 
 def test_the_coupler_is_on_while_the_tool_touches_or_the_device_is_inside_something() -> None:
     """Else the tool is where the device is. Other bodies that overlap do not count."""
-    system, rng, seen = system_of("[0.3, -0.2]"), np.random.default_rng(1), set()
-    world, state = system.world_under(Penalty()), system.make_state()
+    system = system_of("[0.3, -0.2]")
+    rng = np.random.default_rng(1)
+    seen = set()
+    world = system.world_under(Penalty())
+    state = system.make_state()
     port: Any = system.make_port(UnilateralCoupler(*GAINS))
     for _ in range(60):
-        state.q[6:], state.v[:] = rng.normal(size=3), rng.normal(size=9)
+        state.q[6:] = rng.normal(size=3)
+        state.v[:] = rng.normal(size=9)
         start = (4.9, 0.0) if rng.random() < 0.3 else (0.0, -0.3)
-        port.device_q[:], port.device_v[:] = (
-            [*(start + 0.3 * rng.normal(size=2)), rng.normal()],
-            rng.normal(size=3),
-        )
+        port.device_q[:] = [*(start + 0.3 * rng.normal(size=2)), rng.normal()]
+        port.device_v[:] = rng.normal(size=3)
         at_device = state.q.copy()
         at_device[6:] = port.device_q
         found = system.contacts_at(at_device)
         within = bool(np.any((found.body_a == 2) | (found.body_b == 2)))
-        q, v = state.q.copy(), state.v.copy()
+        q = state.q.copy()
+        v = state.v.copy()
         state.state_of_tree[:] = (RESTING, RESTING, RESTING if rng.random() < 0.3 else FREE)
         on = within or state.state_of_tree[2] != FREE
         engage(world, state, port)
@@ -180,7 +182,8 @@ LAW = ImpulseAugmented(rendering="saturate")
 
 def device_of(scene):
     """The device of a scene in Python: the same inertia, damping, delay, sensors and limits."""
-    system, device = System(scene), scene.device
+    system = System(scene)
+    device = scene.device
     q, v = system.start
     mass = system.device_mechanism().mass_matrix(q)
     return SimulatedDevice(
@@ -231,7 +234,8 @@ def test_a_device_that_moves_by_itself_gives_the_run_of_the_compiled_one(couplin
 
 class Reads:
     def __init__(self, q):
-        self.q, self.told = q, []
+        self.q = q
+        self.told = []
 
     def read(self):
         return DeviceReading(self.q, np.zeros(3))

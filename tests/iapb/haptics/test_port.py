@@ -23,18 +23,19 @@ BEHIND = ARM.with_values(
 
 def started(scene: Scene, kind: Any = FourChannel) -> Any:
     """System, world, state and port; tool, device and wrench at random."""
-    system, rng = System(scene), np.random.default_rng(4)
+    system = System(scene)
+    rng = np.random.default_rng(4)
     size = system.tool_dofs[1] - system.tool_dofs[0]
     port = system.make_port(kind(rng.uniform(50.0, 100.0, size), rng.uniform(50.0, 70.0, size)))
-    world, state, device = (
-        system.world_under(ImpulseAugmented()),
-        system.make_state(),
-        system.device_mechanism(),
-    )
+    world = system.world_under(ImpulseAugmented())
+    state = system.make_state()
+    device = system.device_mechanism()
     state.q[:] = system.mechanism.integrate(state.q, rng.normal(size=system.mechanism.nv))
     port.device_q[:] = device.integrate(port.device_q, rng.normal(size=size))
-    state.v[:], port.device_v[:] = rng.normal(size=system.mechanism.nv), rng.normal(size=size)
-    port.wrench[:], port.hand_point[:] = rng.normal(size=6), rng.normal(size=3)
+    state.v[:] = rng.normal(size=system.mechanism.nv)
+    port.device_v[:] = rng.normal(size=size)
+    port.wrench[:] = rng.normal(size=6)
+    port.hand_point[:] = rng.normal(size=3)
     return system, world, state, port
 
 
@@ -46,7 +47,8 @@ def test_the_hand_does_the_work_of_its_wrench_at_the_held_point_of_tool_and_devi
     push by K Δq + B Δv."""
     system, world, state, port = started(scene)
     couple(world, state, port)
-    tool, device = slice(*system.tool_dofs), system.device_mechanism()
+    tool = slice(*system.tool_dofs)
+    device = system.device_mechanism()
     for mechanism, q, body, force in (
         (system.mechanism, state.q, port.hand_body, port.hand_force),
         (device, port.device_q, port.device_body, port.device_hand_force),
@@ -80,7 +82,8 @@ def test_through_a_unilateral_coupler_the_hand_reaches_the_tool_only_as_long_as_
 def test_unilateral_actuators_give_the_coupler_alone_and_others_all_of_it() -> None:
     for kind, share in ((FourChannel, 1.0), (UnilateralCoupler, 0.0)):
         system, _, _, port = started(BEHIND.with_values({"device": None}), kind)
-        rng, tool = np.random.default_rng(0), slice(*system.tool_dofs)
+        rng = np.random.default_rng(0)
+        tool = slice(*system.tool_dofs)
         port.environment_force[:], port.coupling_force[:] = rng.normal(
             size=(2, len(port.coupling_force))
         )

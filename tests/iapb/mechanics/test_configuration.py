@@ -74,9 +74,11 @@ def test_a_free_flyer_moves_by_the_exponential_of_its_twist_and_back(angle: floa
         rng = np.random.default_rng(k)
         axis = rng.normal(size=3)
         axis /= np.linalg.norm(axis)
-        start, u = Rotation.from_rotvec(rng.normal(size=3)), rng.normal(size=3)
+        start = Rotation.from_rotvec(rng.normal(size=3))
+        u = rng.normal(size=3)
         twist = np.zeros((4, 4))
-        twist[:3, :3], twist[:3, 3] = np.cross(np.eye(3), angle * axis), u
+        twist[:3, :3] = np.cross(np.eye(3), angle * axis)
+        twist[:3, 3] = u
         moved = expm(twist)
         q = np.array([*rng.normal(size=3), *start.as_quat()])
         there = flyer.integrate(q, np.array([*u, *(angle * axis)]))

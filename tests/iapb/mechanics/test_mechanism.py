@@ -41,10 +41,12 @@ WHEEL = Mechanism([rod("a", None, 0, Joint("continuous"))])
 def test_the_arm_of_figure_2_has_its_textbook_mass_matrix_and_energy():
     arm = two_link_arm()
     for angle in (0.0, 0.4, 2.0):
-        c, s = np.cos(angle), np.sin(angle)
+        c = np.cos(angle)
+        s = np.sin(angle)
         expected = np.array([[5 / 3 + c, 1 / 3 + c / 2], [1 / 3 + c / 2, 1 / 3]])
         np.testing.assert_allclose(arm.mass_matrix([1.1, angle]), expected, rtol=1e-14)
-        u, w = 0.7, -1.3
+        u = 0.7
+        w = -1.3
         expected = [-s * u * w - s * w * w / 2, s * u * u / 2]
         np.testing.assert_allclose(arm.bias([1.1, angle], [u, w]), expected, atol=1e-15)
     assert arm.kinetic_energy([np.pi / 2, 0.0], [1.0, 1.0]) == pytest.approx(7.0 / 3.0, rel=1e-15)
@@ -59,10 +61,15 @@ def test_mass_matrix_momenta_and_energy_are_sums_over_the_bodies(seed, joints, t
     mechanism = random_mechanism(rng, joints, OFTEN_FIXED, trees)
     q, v = random_state(rng, mechanism)
     rotations, positions = mechanism.placements(q)
-    mass, centers, momenta, spins, masses = np.zeros((mechanism.nv, mechanism.nv)), [], [], [], []
+    mass = np.zeros((mechanism.nv, mechanism.nv))
+    centers = []
+    momenta = []
+    spins = []
+    masses = []
     for b, body in enumerate(mechanism.bodies):
         center = positions[b] + rotations[b] @ body.center_of_mass
-        moving, turning = mechanism.point_jacobian(q, b, center), mechanism.frame_jacobian(q, b)[3:]
+        moving = mechanism.point_jacobian(q, b, center)
+        turning = mechanism.frame_jacobian(q, b)[3:]
         inertia = rotations[b] @ body.inertia @ rotations[b].T
         mass += body.mass * moving.T @ moving + turning.T @ inertia @ turning
         if moving.any() or turning.any():
@@ -70,7 +77,8 @@ def test_mass_matrix_momenta_and_energy_are_sums_over_the_bodies(seed, joints, t
             centers.append(center)
             momenta.append(body.mass * moving @ v)
             spins.append(inertia @ turning @ v)
-    found, size = mechanism.mass_matrix(q), np.abs(mass).max(initial=0.0)
+    found = mechanism.mass_matrix(q)
+    size = np.abs(mass).max(initial=0.0)
     np.testing.assert_allclose(found, mass, rtol=0.0, atol=1e-11 * size)
     outside = np.ones_like(mass, dtype=bool)
     for start, stop in mechanism.tree_dofs:
@@ -105,7 +113,8 @@ def test_jacobians_are_the_derivatives_of_positions(seed, joints):
         there, origin = mechanism.placements(mechanism.integrate(q, v, h))
         return origin[body] + there[body] @ local, there[body]
 
-    (after, turned), (before, unturned) = place(STEP), place(-STEP)
+    (after, turned) = place(STEP)
+    (before, unturned) = place(-STEP)
     point = positions[body] + rotations[body] @ local
     jacobian = mechanism.point_jacobian(q, body, point)
     np.testing.assert_allclose(jacobian @ v, (after - before) / (2 * STEP), atol=1e-6, rtol=1e-6)
@@ -222,9 +231,11 @@ def test_rows_along_number_bodies_as_the_scene_does_where_some_do_not_move(name:
     """The kernels that need M alone leave out what is fixed to the world; contacts name bodies of
     the whole scene."""
     mechanism = mechanism_of(load_scene(find_scene(name)))
-    q, rng = mechanism.neutral(), np.random.default_rng(0)
+    q = mechanism.neutral()
+    rng = np.random.default_rng(0)
     for body in range(len(mechanism.names)):
-        point, along = rng.normal(size=3), rng.normal(size=3)
+        point = rng.normal(size=3)
+        along = rng.normal(size=3)
         [row] = mechanism.rows_along([q], [body], [point], [along])
         np.testing.assert_allclose(
             row, along @ mechanism.point_jacobian(q, body, point), atol=1e-13, rtol=1e-12

@@ -49,7 +49,8 @@ FOLLOWED = {
 
 @pytest.mark.parametrize("mimics", FOLLOWED.values(), ids=FOLLOWED)
 def test_all_quantities_agree_with_pinocchio(mimics: tuple[Mimic | None, ...]) -> None:
-    mechanism, rng = tree(*mimics), np.random.default_rng(0)
+    mechanism = tree(*mimics)
+    rng = np.random.default_rng(0)
     followers = sum(mimic is not None for mimic in mimics)
     assert (mechanism.nq, mechanism.nv) == (15 - followers, 13 - followers)
     assert len(mechanism.coordinate_names) == mechanism.nq == len(mechanism.neutral())
@@ -76,10 +77,12 @@ def test_a_urdf_is_read_as_pinocchio_reads_it_with_mimic(tmp_path: Path) -> None
         '<child link="c"/><axis xyz="0 0 1"/><mimic joint="k"/>'
         '<limit lower="-1" upper="2" effort="1" velocity="1"/></joint></robot>'
     )
-    mechanism, theirs = Mechanism.from_urdf(path), model_from_urdf(path)
+    mechanism = Mechanism.from_urdf(path)
+    theirs = model_from_urdf(path)
     assert mechanism.nv == theirs.nv == 1
     assert read_urdf(path)[2].mimic == Mimic("a", -2.0, 0.1)
-    q, v = np.array([0.4]), np.array([1.3])
+    q = np.array([0.4])
+    v = np.array([1.3])
     assert max(compare(mechanism, theirs, q, v).values()) < AGREEMENT
     # what is timed is Pinocchio's own model, which includes gravity
     mass, _ = calls_from_urdf(path)
@@ -88,7 +91,9 @@ def test_a_urdf_is_read_as_pinocchio_reads_it_with_mimic(tmp_path: Path) -> None
 
 def test_energy_of_free_motion_stays_where_joints_follow() -> None:
     """The kernels' B and M belong together: v·(dM/dt v)/2 = v·B of a scene without forces."""
-    mechanism, rng, h = tree(*FOLLOWED["along a chain"]), np.random.default_rng(1), 1e-6
+    mechanism = tree(*FOLLOWED["along a chain"])
+    rng = np.random.default_rng(1)
+    h = 1e-6
     q = mechanism.integrate(mechanism.neutral(), rng.normal(size=mechanism.nv))
     v = rng.normal(size=mechanism.nv)
     rate = (
@@ -124,7 +129,8 @@ bodies:
      joint_mimic: {{body: a, multiplier: -1.5, offset: 0.3}}}}
   - {{name: c, parent: base, joint: prismatic, axis: [0, 0, 1], {solid}, joint_mimic: {{body: a}}}}
 """)
-    run, mechanism = simulate(scene), mechanism_of(scene)
+    run = simulate(scene)
+    mechanism = mechanism_of(scene)
     kinetic = run.energy["kinetic"]
     assert np.ptp(kinetic) < 1e-11 * kinetic[0] and not run.distrust
     first, last = (mechanism.centroidal_momentum(run.q[k], run.v[k]) for k in (0, -1))
@@ -142,6 +148,7 @@ bodies:
   - {name: right, parent: left, joint: revolute, mass: 1, center_of_mass: [0.1, 0], inertia: 0.1,
      joint_mimic: {body: left, multiplier: 5, offset: 0.3}}
 """)
-    engine, mujoco = simulate(scene, steps=100), simulate(scene, steps=100, world="mujoco")
+    engine = simulate(scene, steps=100)
+    mujoco = simulate(scene, steps=100, world="mujoco")
     np.testing.assert_allclose(mujoco.q, engine.q, atol=1e-3)
     assert engine.q[-1, 0] < -0.02

@@ -83,7 +83,8 @@ def test_a_chain_of_thousands_of_links_is_read(read):
     assert len(read(*links, *joints).names) == n
 
 
-BASE, ARM = link("base"), link("arm")
+BASE = link("base")
+ARM = link("arm")
 MISTAKES = {
     "unknown type": ([BASE, ARM, joint("elbow", "base", "arm", "hinge")], "elbow.*type"),
     "no such link": ([BASE, joint("elbow", "base", "hand")], "elbow.*child"),
@@ -140,10 +141,8 @@ def test_what_others_add_is_let_through(read):
 )
 def test_no_element_can_be_misspelt(tag, tmp_path):
     """One letter lost, anywhere in a shipped file."""
-    text, wrong = (
-        (scene_folder() / "robots" / "seven_axis_arm.urdf").read_text(),
-        tag[:-2] + tag[-1],
-    )
+    text = (scene_folder() / "robots" / "seven_axis_arm.urdf").read_text()
+    wrong = tag[:-2] + tag[-1]
     text = re.sub("<collision>.*?</collision>", "", text, flags=re.DOTALL)
     for found in re.finditer(rf"<{tag}\b", text):
         path = tmp_path / "robot.urdf"

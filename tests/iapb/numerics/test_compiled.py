@@ -142,7 +142,8 @@ def test_a_block_is_made_once_and_has_the_names_of_its_content_alone():
 
 
 def test_kinds_of_blocks_differ_where_their_members_do():
-    same, other = block(outer()), block(outer(small=np.array([300], np.int64)))
+    same = block(outer())
+    other = block(outer(small=np.array([300], np.int64)))
     assert block(outer(count=9, inner=Inner(False, np.ones((5, 1))))).kind_name == same.kind_name
     assert other.kind_name != same.kind_name
     assert isinstance(numba.typeof(same), BlockType) and numba.typeof(same) != numba.typeof(other)

@@ -56,7 +56,8 @@ def test_prismatic_axis_lies_in_the_plane_and_has_length_one() -> None:
     scene = CHAIN.with_values(
         {"bodies.puck": {"name": "puck", "joint": "prismatic", "axis": [0, 5], "mass": 2}}
     )
-    mechanism, (q, _) = mechanism_of(scene), start_of(scene)
+    mechanism = mechanism_of(scene)
+    (q, _) = start_of(scene)
     step = np.zeros(mechanism.nv)
     step[-1] = 0.25
     moved = mechanism.placements(mechanism.integrate(q, step, 1.0))[1] - mechanism.placements(q)[1]
@@ -86,7 +87,10 @@ def test_a_turned_box_of_a_moving_body_is_in_body_axes_with_the_bits_of_plain_ar
         box = {"kind": "box", "size": [width, height], "center": [x, -x], "angle": angle}
         shapes = shapes_of(CHAIN.with_values({"bodies.tool.shapes": [box]}))
         corners = shapes.vertices[shapes.first[TOOL] : shapes.first[TOOL] + 4].tolist()
-        c, s, w, h = math.cos(angle), math.sin(angle), 0.5 * width, 0.5 * height
+        c = math.cos(angle)
+        s = math.sin(angle)
+        w = 0.5 * width
+        h = 0.5 * height
         around = [(-w, -h), (w, -h), (w, h), (-w, h)]
         assert corners == [[a * c - b * s + x, a * s + b * c - x] for a, b in around]
 

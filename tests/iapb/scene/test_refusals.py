@@ -48,7 +48,8 @@ bodies:
 walls:
   - {name: floor, kind: half_space, point: [0, 0, 0], normal: [0, 0, 1]}
 """
-FULL, FULL_SPACE = scene_from_text(PLANE), scene_from_text(SPACE)
+FULL = scene_from_text(PLANE)
+FULL_SPACE = scene_from_text(SPACE)
 
 NOT_A_NUMBER = ["x", None, True, [1], {}, math.nan, math.inf, 1e10]
 NOT_POSITIVE = [*NOT_A_NUMBER, 0.0, -1.0]

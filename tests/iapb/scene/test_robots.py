@@ -44,7 +44,8 @@ def joint(
 
 
 RANGE = '<limit lower="-0.02" upper="0.04" effort="10" velocity="1"/>'
-PALM, FINGER = link("palm", 1.0), link("finger")
+PALM = link("palm", 1.0)
+FINGER = link("finger")
 SLIDE = joint("slide", "finger", inside=RANGE)
 
 
@@ -440,7 +441,8 @@ def test_a_massless_link_of_a_robot_is_named_with_its_joint(load: Load) -> None:
 def test_a_planar_joint_moves_across_its_axis(load: Load, axis: str) -> None:
     slide = joint("move", "finger", "planar").replace('"0 0 1"', f'"{axis}"')
     scene = load(PALM, FINGER, slide, more="position: {finger: [0.3, 0.2, 0.5]}")
-    mechanism, normal = mechanism_of(scene), np.array(axis.split(), float)
+    mechanism = mechanism_of(scene)
+    normal = np.array(axis.split(), float)
     R, p = mechanism.placements(start_of(scene)[0])
     moved = p[-1] - [0.1, 0.0, 0.0]
     assert np.linalg.norm(moved) == pytest.approx(np.hypot(0.3, 0.2))

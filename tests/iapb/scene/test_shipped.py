@@ -34,7 +34,8 @@ def test_arm_touches_the_obstacle_across_the_rod_at_the_named_place(
     name: str, height: float, along: float
 ) -> None:
     scene = load_scene(find_scene(name))
-    mechanism, (q, v) = mechanism_of(scene), start_of(scene)
+    mechanism = mechanism_of(scene)
+    (q, v) = start_of(scene)
     ((point, normal, gap),) = contacts_at(scene, q)
     assert gap == pytest.approx(-1e-9, abs=1e-13)
     np.testing.assert_allclose(normal, [1.0, 0.0, 0.0], atol=1e-12)
@@ -51,7 +52,8 @@ def test_peg_meets_the_tight_hole_at_six_points_in_the_same_instant(depth: float
     mechanism = mechanism_of(scene)
     seated = np.array([0.0, 0.0105, 0.0])
     assert not contacts_at(scene, seated + [0.0, 1e-9, 0.0])
-    q, inward = seated - [0.0, depth, 0.0], np.array([0.0, -0.04, 0.0])
+    q = seated - [0.0, depth, 0.0]
+    inward = np.array([0.0, -0.04, 0.0])
     found = contacts_at(scene, q)
     rows = np.array([normal @ mechanism.point_jacobian(q, 0, point) for point, normal, _ in found])
     assert rows.shape == (6, 3) and (rows @ inward < -10.0 * scene.contact.approach_velocity).all()

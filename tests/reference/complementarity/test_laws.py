@@ -25,7 +25,8 @@ def random_problem(seed: int, contacts: int, e: object) -> ImpactProblem:
     """An impact whose contacts all approach: v is drawn, then rows are turned against it."""
     rng = np.random.default_rng(seed)
     d = int(rng.integers(1, 7))
-    root, v = rng.normal(size=(d, d)), rng.normal(size=d)
+    root = rng.normal(size=(d, d))
+    v = rng.normal(size=d)
     rows = rng.normal(size=(contacts, d))
     rows *= -np.sign(rows @ v)[:, None]
     return ImpactProblem.from_impact(root @ root.T + 0.1 * np.eye(d), rows, v, e)
@@ -42,7 +43,8 @@ def test_equality_is_the_complementarity_solution_exactly_where_it_need_not_pull
     """The wider class of C05: one e, and *some* p >= 0 gives the equality's motion, which then
     solves the LCP."""
     problem = random_problem(seed, 1 + seed % 8, e)
-    rows, mass = problem.contact_jacobian, problem.mass_matrix
+    rows = problem.contact_jacobian
+    mass = problem.mass_matrix
     equality = newton_equality(problem)
     distance = np.abs(newton_lcp(problem).velocity - equality.velocity).max()
     if laws.adhesion(rows, equality.impulse, mass) == laws.ADHESIVE:
@@ -122,7 +124,8 @@ def test_rows_that_depend_up_to_rounding_get_no_impulse_from_noise(condition: fl
     norm says."""
     rng = np.random.default_rng(3)
     axes, _ = np.linalg.qr(rng.normal(size=(6, 6)))
-    mass, rows = axes @ np.diag(np.geomspace(1.0, condition, 6)) @ axes.T, rng.normal(size=(3, 6))
+    mass = axes @ np.diag(np.geomspace(1.0, condition, 6)) @ axes.T
+    rows = rng.normal(size=(3, 6))
     both = np.vstack([rows, rows @ axes @ axes.T])  # the same up to rounding
     problem = ImpactProblem.from_impact(0.5 * (mass + mass.T), both, rng.normal(size=6), 0.5)
     p = newton_equality(problem).impulse
@@ -134,10 +137,12 @@ def test_rows_that_depend_up_to_rounding_get_no_impulse_from_noise(condition: fl
 def test_the_engines_pushing_method_is_the_newton_lcp(seed: int, e: float) -> None:
     problem = random_problem(seed, 1 + seed % 8, e)
     impact = problem.mass_matrix, problem.contact_jacobian, problem.velocity
-    found, law = resolve_impact(*impact, e, method="poisson"), newton_lcp(problem)
+    found = resolve_impact(*impact, e, method="poisson")
+    law = newton_lcp(problem)
     kinetic = np.linalg.cholesky(problem.mass_matrix).T
     energy = 0.5 * float(np.sum((kinetic @ problem.velocity) ** 2))
-    eps, condition = float(np.finfo(float).eps), np.linalg.cond(problem.mass_matrix)
+    eps = float(np.finfo(float).eps)
+    condition = np.linalg.cond(problem.mass_matrix)
     promised = 10.0 * len(problem.velocity) * eps * np.sqrt(condition) * energy
     assert found.impulses.min() >= 0.0 and found.energy_change <= promised
     distance = np.linalg.norm(kinetic @ (found.velocity - law.velocity))
@@ -152,7 +157,8 @@ def test_poissons_law_on_dependent_rows_of_both_signs() -> None:
     for seed in range(12):
         rng = np.random.default_rng(seed)
         rows = rng.integers(-2, 3, size=(60, 3)).astype(float) @ rng.integers(-2, 3, size=(3, 5))
-        v, e = rng.normal(size=5), (0.0, 0.5, 1.0)[seed % 3]
+        v = rng.normal(size=5)
+        e = (0.0, 0.5, 1.0)[seed % 3]
         outcome = poisson(ImpactProblem.from_impact(np.eye(5), rows, v, e))
         assert outcome.residual <= 1e-12
         assert outcome.velocity @ outcome.velocity <= v @ v * (1.0 + 1e-12)

@@ -33,7 +33,8 @@ REACHED = {"proxqp": 1e-5, "cvxpy_scs": 1e-5, "cvxpy_osqp": 1e-6, "cvxpy_clarabe
 # slow on nearly dependent ones; their solution must then judge itself unsolved, and in a few of the
 # SEEDS only.
 MAY_FAIL = {"quadprog", "lemke", "gauss_seidel"}
-SEEDS, FAILURES_ALLOWED = 12, 2
+SEEDS = 12
+FAILURES_ALLOWED = 2
 
 
 @pytest.mark.parametrize("name", [name for name in SOLVERS if SOLVERS[name].takes != "cone"])
@@ -41,13 +42,16 @@ def test_solvers_agree_with_enumeration_by_velocities(name: str) -> None:
     failures = 0
     for seed in range(SEEDS):
         rng = np.random.default_rng(seed)
-        d, c = rng.integers(1, 7), rng.integers(1, 8)
-        rank, root = rng.integers(1, d + 1), rng.normal(size=(d, d))
+        d = rng.integers(1, 7)
+        c = rng.integers(1, 8)
+        rank = rng.integers(1, d + 1)
+        root = rng.normal(size=(d, d))
         rows = rng.normal(size=(c, rank)) @ rng.normal(size=(rank, d))
         problem = ImpactProblem.from_impact(
             root @ root.T + 0.1 * np.eye(d), rows, rng.normal(size=d), rng.uniform()
         )
-        truth, solution = solve(problem, "enumeration").velocity_plus, solve(problem, name)
+        truth = solve(problem, "enumeration").velocity_plus
+        solution = solve(problem, name)
         if name in MAY_FAIL and not solution.solved():
             assert solution.verdict() == "failed"
             failures += 1
@@ -116,7 +120,8 @@ def test_enumeration_finds_solutions_at_every_scale(scale: float) -> None:
         assert solve(problem, "enumeration").solved(1e-12) == (sign > 0.0)
 
 
-LCP, IMPACT = ImpactProblem.from_delassus, ImpactProblem.from_impact
+LCP = ImpactProblem.from_delassus
+IMPACT = ImpactProblem.from_impact
 
 
 @pytest.mark.parametrize(
@@ -237,7 +242,8 @@ def test_the_relaxed_law_lifts_off_where_it_slides(solver: str) -> None:
 def test_solvers_agree_on_random_problems(relaxed: bool) -> None:
     for seed in range(6):
         rng = np.random.default_rng(seed)
-        root, rows = rng.normal(size=(6, 6)), rng.normal(size=(3 * int(rng.integers(1, 4)), 6))
+        root = rng.normal(size=(6, 6))
+        rows = rng.normal(size=(3 * int(rng.integers(1, 4)), 6))
         problem = ImpactProblem.from_impact(
             root @ root.T + np.eye(6), rows, rng.normal(size=6), 0.2, 0.3, relaxed=relaxed
         )
@@ -265,7 +271,8 @@ def test_kinds_of_problems_are_refused_by_solvers_of_the_other_kind() -> None:
 @given(st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3), st.floats(0.0, 2.0))
 def test_projection_obeys_moreau(x: list[float], mu: float) -> None:
     """x = proj_K(x) − proj_K*(−x), the two parts orthogonal, each in its cone."""
-    point, friction = np.array([x]), np.array([mu])
+    point = np.array([x])
+    friction = np.array([mu])
     inside = project_on_cone(point, friction)
     rest = inside - point  # lies in the dual cone
     assert np.abs(project_on_cone(inside, friction) - inside).max() <= 1e-12
