@@ -7,12 +7,9 @@ performs them.
                          output
     ```yaml, ```python   whose first line is "# some/file.yaml" or "# some/file.py": that file is
                          written
-    ```diff              first line "# some/file.py": lines with "+" are added to that file beside
-                         its " " lines
     ```sh                only read: every `make` target must exist
 
-The working directory is where files are written; for documents that add to the project it holds a
-copy of it.
+The working directory is where files are written.
 """
 
 from __future__ import annotations
@@ -37,7 +34,7 @@ _COMMAND = re.compile(r"^\$ (.*)\n((?:(?!\$ ).*\n)*)", flags=re.M)
 
 @dataclass
 class Block:
-    """One thing to do: `kind` is python, command, file, diff or sh.
+    """One thing to do: `kind` is python, command, file or sh.
 
     id : document and line; path : of a file to write or change
     expected, span : the output printed below it, and where the document has it; None without output
@@ -74,15 +71,8 @@ def read_blocks(name):
                 )
                 for command in _COMMAND.finditer(body)
             ]
-        elif language in ("diff", "python", "yaml") and named:
-            found.append(
-                Block(
-                    place,
-                    "diff" if language == "diff" else "file",
-                    body[named.end() :] if language == "diff" else body,
-                    named[1],
-                )
-            )
+        elif language in ("python", "yaml") and named:
+            found.append(Block(place, "file", body[named.end() :], named[1]))
         elif language in ("python", "sh"):
             found.append(Block(place, language, body))
         else:
@@ -93,21 +83,17 @@ def read_blocks(name):
 def perform(name):
     """Do every block of a document; a failure is recorded, and the blocks after it are still tried.
 
-    Files and lines are written first: what is imported once would not see a line that comes later.
+    Files are written first: what is imported once would not see a file that comes later.
     """
     namespace, blocks = {"__name__": "document"}, read_blocks(name)
     answers = [{}] * len(blocks)
-    for number, block in sorted(
-        enumerate(blocks), key=lambda pair: pair[1].kind not in ("file", "diff")
-    ):
+    for number, block in sorted(enumerate(blocks), key=lambda pair: pair[1].kind != "file"):
         out, failure, path = io.StringIO(), "", Path(block.path)
         try:
             with redirect_stdout(out), redirect_stderr(out):
                 if block.kind == "file":
                     path.parent.mkdir(parents=True, exist_ok=True)
                     path.write_text(block.source, encoding="utf-8")
-                elif block.kind == "diff":
-                    _apply_diff(path, block.source)
                 elif block.kind == "python":
                     exec(compile(block.source, block.id, "exec"), namespace)
                 elif block.kind == "command":
@@ -147,23 +133,6 @@ def _command(words):
         )
     else:
         raise ValueError(f"documents may not use the command {words[0]!r}: nothing would check it")
-
-
-def _apply_diff(path, text):
-    """Insert the lines with "+" beside those with " ", which must stand in the file together and
-    once."""
-    whole = "\n" + path.read_text(encoding="utf-8")
-    for part in re.split(r"^…?\n", text, flags=re.M):
-        before, after = (
-            "".join(f"\n{line[1:]}" for line in part.splitlines() if line[0] in signs)
-            for signs in (" ", "+ ")
-        )
-        if part and whole.count(f"{before}\n") != 1:
-            raise ValueError(
-                f"{path} has these lines {whole.count(before)} times, not once:{before}"
-            )
-        whole = whole.replace(f"{before}\n", f"{after}\n")
-    path.write_text(whole[1:], encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -11,7 +11,6 @@ import math
 import os
 import re
 import runpy
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -31,13 +30,11 @@ from reports.figures.tilts import hero
 from verification.claims.conditions import IGNORED, Condition
 
 PICTURES = ROOT / "docs/pictures"
-PACKAGES = ("iapb", "reference", "verification", "reports")
-ADDS_TO_THE_PROJECT = ("docs/extending.md",)
 DOCUMENTS = (
     "README.md",
     *(
         pytest.param(f"docs/{name}.md", marks=pytest.mark.thorough)
-        for name in ("tutorial", "extending", "scenes", "resolvers", "questions")
+        for name in ("tutorial", "scenes", "resolvers", "questions")
     ),
 )
 WIDTH = "100"  # of the terminal that the documents show
@@ -103,18 +100,10 @@ def same(a, b):
     return a == b if whole else math.isclose(float(a), float(b), rel_tol=RELATIVE, abs_tol=ROUNDING)
 
 
-def copy_project(folder):
-    """Copy the packages and scenes, with the library of the engine."""
-    for name in (*PACKAGES, "scenes"):
-        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
-
-
 @pytest.mark.parametrize("name", DOCUMENTS)
 def test_document(name, tmp_path):
     work, told = tmp_path / "work", tmp_path / "answers.json"
     work.mkdir()
-    if name in ADDS_TO_THE_PROJECT:
-        copy_project(work)
     environment = {
         **os.environ,
         "PYTHONPATH": f"{work}{os.pathsep}{ROOT}",
@@ -179,6 +168,18 @@ def test_example(path, shared, capfd):
         else:
             runpy.run_path(str(path), run_name="__main__")
     assert capfd.readouterr().out.strip()
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(
+    "path", sorted((ROOT / "examples/extending").glob("*.py")), ids=lambda path: path.stem
+)
+def test_extension(path, tmp_path):
+    """It adds itself to the project, in a process of its own, and prints what its text says."""
+    says = path.read_text(encoding="utf-8").split("Prints:\n")[1].partition('"""')[0]
+    done = subprocess.run([sys.executable, path], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert not differs(done.stdout, says)
 
 
 @pytest.mark.parametrize(

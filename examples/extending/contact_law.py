@@ -1,7 +1,12 @@
-"""Your own contact law beside the engine's: an impulse stops every approaching contact in each
-step.
+"""A contact law beside the engine's: an impulse stops every approaching contact in each step.
 
-Run it: python examples/own_law.py
+`simulate(scene, law=...)` needs no registration. One line of `WORLDS` makes it a world by name, for
+`iapb run --world impulses`. An attribute `uses` names the parts of the contact section that the law
+uses (`iapb.contact.laws`).
+
+Prints:
+    impulse-augmented … the peg is at x = …
+    impulses only … the peg is at x = 10.416 mm, y = -5.208 mm
 """
 
 from dataclasses import dataclass, field
@@ -12,6 +17,7 @@ import numpy as np
 from iapb import find_scene, resolve_impact, simulate
 from iapb.contact.laws import StepResult
 from iapb.run import COLLIDING, FREE
+from iapb.worlds import WORLDS, World
 from reference.contact_rows import find_rows
 
 
@@ -43,9 +49,10 @@ class ImpulsesOnly:
         )
 
 
+WORLDS["impulses"] = lambda rendering: World("impulses", ImpulsesOnly(), "four-channel")
+
 scene = find_scene("peg_corner")
 for law in (None, ImpulsesOnly()):
     run = simulate(scene, law=law, steps=512)
-    print(
-        f"{run.law:<30} the peg is at x = {1e3 * run.q[-1, 0]:.3f} mm, y = {1e3 * run.q[-1, 1]:.3f} mm"
-    )
+    x, y = 1e3 * run.q[-1, :2]
+    print(f"{run.law:<20} the peg is at x = {x:.3f} mm, y = {y:.3f} mm")
