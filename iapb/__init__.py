@@ -11,12 +11,12 @@ from iapb.lazy import lazy_names
 
 if TYPE_CHECKING:
     from iapb.advice.checks import check_scene as check_scene
-    from iapb.advice.effects import Effect as Effect
-    from iapb.advice.effects import decide_effects as decide_effects
     from iapb.contact.impact import Impact as Impact
     from iapb.contact.impact import resolve_frictional_impact as resolve_frictional_impact
     from iapb.contact.impact import resolve_impact as resolve_impact
     from iapb.contact.impact import resolve_impacts as resolve_impacts
+    from iapb.effects import Effect as Effect
+    from iapb.effects import decide_effects as decide_effects
     from iapb.errors import ArgumentError as ArgumentError
     from iapb.errors import IapbError as IapbError
     from iapb.errors import MissingDependencyError as MissingDependencyError
@@ -49,7 +49,7 @@ _HOME = {
         "resolve_impact",
         "resolve_impacts",
     ),
-    "iapb.advice.effects": ("Effect", "decide_effects"),
+    "iapb.effects": ("Effect", "decide_effects"),
     "iapb.errors": (
         "ArgumentError",
         "IapbError",

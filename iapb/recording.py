@@ -17,6 +17,7 @@ from iapb.mechanics.energy import FORCES, energy_of_run, last_of
 from iapb.numerics.schema import Floats
 from iapb.run import UNSOLVED, ContactTable, EffectRow, ImpactTable, Later, Run, digests
 from iapb.scene.model import SpatialScene
+from iapb.system import System
 from iapb.thinning import Thinned
 
 _CONTACT_ROWS_PER_CHUNK = (
@@ -165,7 +166,7 @@ class Recorder:
             "scene_resolved": Later(lambda run: scene.resolved()),
             "pose": Later(lambda run: mechanism.poses(run.q, planar=planar)),
             "energy": Later(lambda run: _shown(ledger(run), run)),
-            "distrust": Later(partial(_distrust, self._at_first)),
+            "distrust": Later(partial(_distrust, self._at_first, system)),
         }
         remarks = system.remarks + (UNSOLVED,) * bool(simulation.state.rest_work.shortened[0])
         return Run(
@@ -240,12 +241,12 @@ def _shown(ledger: dict[str, Floats], run: Run) -> dict[str, Floats]:
 
 
 def _distrust(
-    at_first: tuple[dict[str, Floats], dict[str, float]] | None, part: Run
+    at_first: tuple[dict[str, Floats], dict[str, float]] | None, system: System, part: Run
 ) -> tuple[str, ...]:
     """Return the distrust of a run; of a later part, as if its first state were that of the whole
     run."""
     if at_first is None:
-        return distrust_of(part)
+        return distrust_of(part, system)
     states: dict[str, Any] = {
         name: np.concatenate([state[None], getattr(part, name)[1:]])
         for name, state in at_first[0].items()
@@ -254,4 +255,4 @@ def _distrust(
         name: np.concatenate([[value], part.energy[name][1:]])
         for name, value in at_first[1].items()
     }
-    return distrust_of(replace(part, energy=part.energy | ledger, distrust=(), **states))
+    return distrust_of(replace(part, energy=part.energy | ledger, distrust=(), **states), system)

@@ -9,10 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from iapb.advice.effects import EFFECT_NAMES, Effect, active_names, decide_for
-from iapb.advice.solids import solids_of
 from iapb.contact.finding import ContactFinder, Contacts
-from iapb.contact.geometry import ContactBuffer, Shapes, contact_capacity
+from iapb.contact.geometry import ContactBuffer, contact_capacity
 from iapb.contact.kernels.broadphase import bounding_sphere, make_broad_phase
 from iapb.contact.kernels.impact import ImpactWork
 from iapb.contact.kernels.impact_friction import FrictionWork
@@ -21,6 +19,8 @@ from iapb.contact.kernels.touch import MOST
 from iapb.contact.kernels.unilateral import PushWork, ShareWork
 from iapb.contact.kernels.world import Cut, State, Sweep, Switches, World
 from iapb.contact.laws import ImpulseAugmented
+from iapb.contact.solids import Solid, solids_of
+from iapb.effects import EFFECT_NAMES, Effect, active_names, decide_for
 from iapb.errors import ArgumentError
 from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling, UnilateralCoupler
 from iapb.haptics.rendering import PLANNED, Port
@@ -92,6 +92,11 @@ class System:
         return self.mechanism.alone(self.tool_tree)
 
     @cached_property
+    def solids(self) -> dict[int, Solid]:
+        """The solid of each shape that is not endless."""
+        return solids_of(self.shapes)
+
+    @cached_property
     def finder(self) -> ContactFinder:
         """Finds contacts at given placements of the bodies."""
         return ContactFinder(self.shapes, self.pairs)
@@ -143,7 +148,7 @@ class System:
                 shapes=self.shapes,
                 pairs=self.pairs,
                 broad_phase=make_broad_phase(self.shapes, self.pairs),
-                sweep=_sweep_of(self.shapes, mechanism),
+                sweep=_sweep_of(self),
                 tree_of_body=mechanism.tree_of_body,
                 tree_start=np.ascontiguousarray(ranges[:, 0]),
                 tree_stop=np.ascontiguousarray(ranges[:, 1]),
@@ -391,15 +396,16 @@ def coupling_of(scene: Scene, name: str) -> Coupling:
     return kinds[name](tuple(gains.stiffness), tuple(gains.damping))
 
 
-def _sweep_of(shapes: Shapes, mechanism: Mechanism) -> Sweep:
+def _sweep_of(system: System) -> Sweep:
     """Return what the search for touches within a step needs of all shapes."""
+    shapes = system.shapes
     spheres = [bounding_sphere(shapes, i) for i in range(len(shapes.kind))]
     middle = np.array([middle for middle, _ in spheres], np.float64).reshape(-1, 3)
     radius = np.array([radius for _, radius in spheres], np.float64)
     thin = np.full(len(spheres), np.inf)
-    for i, solid in solids_of(shapes).items():
+    for i, solid in system.solids.items():
         thin[i] = solid.thin
     reach = (np.linalg.norm(middle, axis=1) + radius)[shapes.body >= 0].max(initial=0.0)
-    linked = any(body.parent is not None for body in mechanism.bodies)
+    linked = any(body.parent is not None for body in system.mechanism.bodies)
     lever = np.inf if linked else np.sqrt(3.0) * (1.0 + reach)
     return Sweep(middle, radius, thin, float(thin.min(initial=np.inf)), float(lever))

@@ -33,7 +33,7 @@ from typing import Any
 
 import numpy as np
 
-from iapb.advice.effects import ignored_fields
+from iapb.effects import ignored_fields
 from iapb.errors import ArgumentError, IapbError
 from iapb.mechanics.mechanism import Mechanism
 from iapb.names import one_of

@@ -1,6 +1,6 @@
 """An effect: whether contacts may pull, with the reason.
 
-In the project it is one row of `EFFECTS` in iapb/advice/effects.py. An effect that changes the step
+In the project it is one row of `EFFECTS` in iapb/effects.py. An effect that changes the step
 needs a flag of its name in `Switches` (iapb/contact/kernels/world.py), too.
 
 Prints:
@@ -9,8 +9,8 @@ Prints:
 """
 
 from iapb import decide_effects, find_scene, load_scene
-from iapb.advice.effects import EFFECTS, Question, Rule
 from iapb.contact import laws
+from iapb.effects import EFFECTS, Question, Rule
 
 
 def clamped(question: Question) -> str:

@@ -21,15 +21,16 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from iapb.advice.loops import MARGIN, SOON, HapticLoop, hold, nearest, scaled
-from iapb.advice.solids import joined, solids_of
 from iapb.contact import geometry, laws
-from iapb.contact.finding import ContactFinder, Contacts
+from iapb.contact.finding import Contacts
 from iapb.contact.kernels.implicit import COMPLIANCE, FADING
+from iapb.contact.solids import joined
 from iapb.names import in_metres
 from iapb.numerics.schema import Floats, Integers
 from iapb.scene import Scene, SpatialScene, mechanism
 from iapb.scene.bodies import inertia_matrix
 from iapb.scene.model import MAX_RATE, Gains, Hand
+from iapb.system import System, system_of
 
 Rows = Integers  # numbers of contacts
 
@@ -90,21 +91,18 @@ class Start:
 
     def __init__(self, scene: Scene) -> None:
         mechanism.require_joints(scene)
+        system = system_of(scene)
         self.scene = scene
-        self.dt = 1.0 / scene.rate
+        self.dt = system.dt
         self.spatial = isinstance(scene, SpatialScene)
-        self.mechanism = mechanism.mechanism_of(scene)
-        (self.q, self.v) = mechanism.start_of(scene)
-        self.shapes = mechanism.shapes_of(scene)
-        self.pairs, self.stops = (
-            mechanism.pairs_of(scene, self.shapes),
-            mechanism.stops_of(scene, self.mechanism),
-        )
-        self.gravity = np.array([*(scene.gravity or ()), 0.0, 0.0, 0.0])[:3]
-        self.labels = [body.name for body in scene.bodies for _ in body.shapes] + [
-            wall.name for wall in scene.walls
-        ]
-        solids = solids_of(self.shapes)
+        self.mechanism = system.mechanism
+        self.q, self.v = system.start
+        self.shapes = system.shapes
+        self.pairs = system.pairs
+        self.stops = system.stops
+        self.gravity = system.gravity
+        self.labels = mechanism.shape_names(scene)
+        solids = system.solids
         trees = self.mechanism.tree_of_body
         size = [solids[i].thin if i in solids else math.inf for i in range(len(self.labels))]
         ranges = mechanism.limits_of(scene)
@@ -122,7 +120,7 @@ class Start:
         )
         # contacts: trees (at a wall twice the same), Jacobian rows J (c, d), friction, thickness of
         # the thinner
-        self.found = found = self._contacts(size[: len(self.shapes.kind)])
+        self.found = found = self._contacts(system, size[: len(self.shapes.kind)])
         self.tree_a = trees[found.body_a]
         self.tree_b = trees[np.where(found.body_b < 0, found.body_a, found.body_b)]
         self.rows = self.rows_along(np.arange(len(found.gap)), found.normal)
@@ -130,12 +128,12 @@ class Start:
         self.rows[np.arange(self.first_stop, len(self.rows)), self.stops.dof] = (
             self.stops.arm * self.stops.sign
         )
-        classes, table = mechanism.frictions_of(scene)
+        classes, table = system.frictions
         self.friction = table[classes[found.shape_a], classes[found.shape_b]]
         self.size = np.array(size)
         self.thickness = np.minimum(self.size[found.shape_a], self.size[found.shape_b])
 
-    def _contacts(self, sizes: list[float]) -> Contacts:
+    def _contacts(self, system: System, sizes: list[float]) -> Contacts:
         """Return the contacts between the closest features of each pair, near or far, and those of
         joint limits."""
         margin = math.inf
@@ -143,7 +141,7 @@ class Start:
             margin = max((size for size in sizes if size < math.inf), default=0.0)
         placed = self.mechanism.placements(self.q)
         stops = self.stops
-        found = ContactFinder(self.shapes, self.pairs).find(*placed, margin)
+        found = system.finder.find(*placed, margin)
         limits = Contacts(
             stops.shape,
             stops.shape,

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from iapb.advice.solids import Solid, joined, solids_of
 from iapb.contact.kernels.implicit import FADING
+from iapb.contact.solids import Solid, joined
 from iapb.mechanics.energy import FORCES, energy_ledger, lost_within, moved_straight
 from iapb.mechanics.joints import KINDS
 from iapb.mechanics.rotations import rotation_of
@@ -22,8 +22,9 @@ from iapb.names import in_metres
 from iapb.numerics.schema import Booleans, Floats, Integers
 from iapb.run import UNSOLVED, Run
 from iapb.scene.bodies import WORLD, inertia_matrix
-from iapb.scene.mechanism import limits_of, mechanism_of, pairs_of, shapes_of
+from iapb.scene.mechanism import limits_of, shape_names
 from iapb.scene.model import scene_kind
+from iapb.system import System
 
 # share of the available energy, or of a free momentum, that errors of a first-order step may add
 UNACCOUNTED = 0.02
@@ -54,9 +55,12 @@ SLOW = 1e-6  # [m/s, rad/s] of a free body: slower motion may be rounding error
 WILD = 10.0  # factor on the farthest distance that start, speed and acceleration explain
 
 
-def distrust_of(run: Run) -> tuple[str, ...]:
+def distrust_of(run: Run, system: System | None = None) -> tuple[str, ...]:
     """Return the reasons why a result is not to be trusted, from the record alone; empty if nothing
-    is wrong."""
+    is wrong.
+
+    `system` is that of the record's scene; without it, it is made from the record.
+    """
     if not (np.isfinite(run.q).all() and np.isfinite(run.v).all()):
         return ("positions or velocities are not finite",)
     if not run.steps or [body.get("name") for body in run.scene_resolved.get("bodies", ())] != [
@@ -64,7 +68,7 @@ def distrust_of(run: Run) -> tuple[str, ...]:
     ]:
         return ()
     with np.errstate(all="ignore"):  # the square of what exploded may overflow
-        seen = _Seen(run)
+        seen = _Seen(run, system)
         if (seen.mechanism.nq, seen.mechanism.nv) != (run.q.shape[1], run.v.shape[1]):
             return ()  # the record's scene does not describe its bodies
         driven = tuple(_driven(seen))
@@ -78,21 +82,18 @@ def distrust_of(run: Run) -> tuple[str, ...]:
 class _Seen:
     """A run with its scene, made again from the record, its mechanism and its shapes."""
 
-    def __init__(self, run: Run) -> None:
+    def __init__(self, run: Run, system: System | None) -> None:
+        if system is None:
+            values = run.scene_resolved
+            system = System(scene_kind(values).model_validate(values))
         self.run = run
-        self.scene = scene_kind(run.scene_resolved).model_validate(run.scene_resolved)
-        self.bodies, self.mechanism, shapes = (
-            self.scene.bodies,
-            mechanism_of(self.scene),
-            shapes_of(self.scene),
-        )
-        self.gravity = np.array([*(self.scene.gravity or ()), 0.0, 0.0, 0.0])[:3]
-        self.solids = solids_of(shapes)  # by shape, without endless walls
-        self.names = [one.name for one in self.bodies for _ in one.shapes] + [
-            wall.name for wall in self.scene.walls
-        ]
-        pairs = pairs_of(self.scene, shapes)
-        self.pairs = pairs[np.isin(pairs, [*self.solids]).all(axis=1)]
+        self.scene = system.scene
+        self.bodies = system.scene.bodies
+        self.mechanism = system.mechanism
+        self.gravity = system.gravity
+        self.solids = system.solids  # by shape, without endless walls
+        self.names = shape_names(system.scene)
+        self.pairs = system.pairs[np.isin(system.pairs, [*self.solids]).all(axis=1)]
         self.sizes = np.full(
             len(self.bodies) + 1, math.inf
         )  # smallest extent of each body; last, of the world

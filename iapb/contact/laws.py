@@ -75,7 +75,7 @@ class ContactLaw(Protocol):
     A law may also write its contacts to ``state.contacts`` and their number to
     ``state.contact_count[0]``; the run then records them. A law should keep no state of its own:
     everything that changes belongs in `state`. The optional attribute `uses` names the parts of the
-    contact section that affect the law (`iapb.advice.effects` reads it). Without it, every part is
+    contact section that affect the law (`iapb.effects` reads it). Without it, every part is
     assumed to affect the law.
     """
 

@@ -13,18 +13,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from iapb.contact import geometry
+from iapb.contact.finding import ContactFinder
 from iapb.contact.geometry import Shapes, candidate_pairs, frame_along, make_shapes
 from iapb.contact.kernels.contact_set import TOUCHING
-from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.world import Stops
 from iapb.errors import ArgumentError
 from iapb.mechanics.bodies import Body
 from iapb.mechanics.joints import KINDS, Joint, Mimic, ranges_of
 from iapb.mechanics.mechanism import Mechanism
 from iapb.mechanics.rotations import rotation_of
-from iapb.numerics.compiled import block
 from iapb.numerics.linalg import product
-from iapb.numerics.schema import Booleans, Floats, Indices, Integers, zeros_of
+from iapb.numerics.schema import Booleans, Floats, Indices, Integers
 from iapb.scene.bodies import WORLD, inertia_matrix
 from iapb.scene.model import Scene, SpatialScene
 from iapb.scene.parts import SMALLEST_POSITIVE
@@ -179,6 +178,11 @@ def _owned_shapes(scene: Scene) -> list[tuple[int, Any, Any]]:
     return of_bodies + [(-1, wall, wall) for wall in scene.walls]
 
 
+def shape_names(scene: Scene) -> list[str]:
+    """Return the name of the body or wall of each shape."""
+    return [owner.name for _, owner, _ in _owned_shapes(scene)]
+
+
 def shapes_of(scene: Scene) -> Shapes:
     """Return the scene's shapes: those of the bodies in order, then the walls.
 
@@ -264,7 +268,7 @@ def pairs_and_remarks(scene: Scene, shapes: Shapes) -> tuple[Pairs, tuple[str, .
     apart = (bodies < 0).any(axis=0) | (tree_a != tree_b)
     links = ~apart & ~adjoining & scene.contact.self_collisions
     overlapping = _overlapping_at_start(scene, shapes, pairs[links])
-    owners = [owner.name for _, owner, _ in _owned_shapes(scene)]
+    owners = shape_names(scene)
     named = sorted({f"{owners[a]} and {owners[b]}" for a, b in pairs[links][overlapping]})
     links[links] = ~overlapping
     said = f"{', '.join(named)} overlap at the start: links of one tree, they never touch"
@@ -275,10 +279,9 @@ def _overlapping_at_start(scene: Scene, shapes: Shapes, pairs: Pairs) -> Boolean
     """Return which of some pairs of shapes (k, 2) overlap in the pose of the start."""
     if not len(pairs):
         return np.zeros(0, np.bool_)
-    buffer = zeros_of(geometry.ContactBuffer, contact=geometry.contact_capacity(shapes, pairs))
     placed = mechanism_of(scene).placements(start_of(scene)[0])
-    count = int(detect(block(shapes), pairs, *placed, -TOUCHING, block(buffer)))
-    found = set(zip(buffer.shape_a[:count].tolist(), buffer.shape_b[:count].tolist(), strict=True))
+    contacts = ContactFinder(shapes, pairs).find(*placed, -TOUCHING)
+    found = set(zip(contacts.shape_a.tolist(), contacts.shape_b.tolist(), strict=True))
     return np.array([tuple(pair) in found for pair in pairs.tolist()])
 
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from iapb import decide_effects
-from iapb.advice.effects import ignored_fields
+from iapb.effects import ignored_fields
 from iapb.errors import ArgumentError
 from iapb.worlds import find_world
 from reports.commands.run import Rendering, SceneName, scene_given

@@ -11,7 +11,7 @@ import numpy as np
 import typer
 
 from iapb.advice.checks import check_scene
-from iapb.advice.effects import ignored_fields
+from iapb.effects import ignored_fields
 from iapb.errors import to_stderr
 from iapb.run import INTERRUPTED, Run
 from iapb.scene import Scene, find_scene, load_scene, scene_names

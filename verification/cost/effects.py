@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 
 from iapb import decide_effects, find_scene, load_scene
-from iapb.advice.effects import EFFECT_NAMES
 from iapb.contact.kernels import world as engine
 from iapb.contact.laws import Penalty
+from iapb.effects import EFFECT_NAMES
 from iapb.errors import IapbError
 from iapb.haptics.coupling import NoCoupling
 from iapb.numerics.compiled import block

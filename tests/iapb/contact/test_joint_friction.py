@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from iapb.advice.effects import decide_effects, ignored_fields
 from iapb.contact.laws import Penalty
+from iapb.effects import decide_effects, ignored_fields
 from iapb.scene import Scene, scene_from_text
 from iapb.simulation import simulate
 from iapb.system import System

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from iapb.advice.checks import check_scene
-from iapb.advice.effects import decide_effects
+from iapb.effects import decide_effects
 from iapb.errors import ArgumentError, SceneError
 from iapb.mechanics.mechanism import Mechanism
 from iapb.scene import Scene, scene_from_text

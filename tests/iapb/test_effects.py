@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from iapb.advice.effects import COUPLING_FIELDS, EFFECTS, Effect, decide_effects
 from iapb.contact.laws import ImpulseAugmented, Penalty
+from iapb.effects import COUPLING_FIELDS, EFFECTS, Effect, decide_effects
 from iapb.haptics.coupling import FourChannel, UnilateralCoupler
 from iapb.scene import Scene, find_scene, load_scene, scene_names
 from reference.time_stepping import RigidConstraints
