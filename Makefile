@@ -52,7 +52,7 @@ reproduce: setup ## regenerate every figure, table and claim into out/report.htm
 
 .PHONY: verify
 verify: setup ## the laws at 1,000,000 impacts and 7,000 trajectories; half an hour of a core; Ctrl-C prints what was found
-	@$(BIN)/iapb verify --full --workers $(PYTEST_WORKERS)
+	@$(BIN)/iapb verify-many --workers $(PYTEST_WORKERS)
 
 .PHONY: portable
 portable: setup ## tests, runs and report under other BLAS kernels, numpy, libm and threads; SETTINGS="Haswell Zen" selects

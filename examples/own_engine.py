@@ -2,7 +2,7 @@
 loss.
 
 Run it: python examples/own_engine.py
-Also, in this folder: iapb verify --world own_engine:Springs; iapb compare two_discs --worlds
+Also, in this folder: iapb verify-world own_engine:Springs; iapb compare two_discs --worlds
 own_engine:Springs,ideal
 """
 

@@ -19,8 +19,8 @@ import typer
 
 from iapb.errors import ArgumentError, IapbError, RunFileError, harmless, name_the_extra
 
-# command -> its line in `iapb --help`. The module of that name in reports.commands has a function
-# with the same name. Only the module of the given command is imported; `iapb --help` imports none.
+# command -> its line in `iapb --help`. The module of that name in reports.commands, with _ for -,
+# has a function with the same name. Only the module of the given command is imported; `iapb --help` imports none.
 COMMANDS = {
     "run": "Simulate SCENE and store the run as HDF5. An existing run is reused.",
     "check": "Warn of problems that would make a run of SCENE worthless, with values to set; end with 3 then.",
@@ -33,7 +33,10 @@ COMMANDS = {
     "prove": "Check every machine-checked statement, or print the proof of one.",
     "verify": "Test an impact resolver against every law; print the verdict, the worst case and a shrunk "
     "counterexample.",
-    "compare": "Compare worlds on SCENE; without SCENE, IAPB with complementarity, and solvers on problem files.",
+    "verify-many": "Test the laws on a million impacts and thousands of trajectories; Ctrl-C lists what was found.",
+    "verify-world": "Put a world to the laws of trajectories on random scenes.",
+    "compare": "Compare worlds on SCENE: distances, energy, time, and its impacts by every solver.",
+    "solvers": "Put problem files to every complementarity solver; or compare IAPB with complementarity.",
     "bench": "Time a step, an impact and a motion; compare with MuJoCo, Pinocchio, solvers and the printed formula.",
     "sweep": "Simulate every point of STUDY that has no run file yet, and write a table of all points.",
     "store": "Check the run and table files below a folder, or simulate its runs again.",
@@ -44,7 +47,7 @@ COMMANDS = {
 GROUPS = {  # of the help, in its order
     "Simulate": ("run", "check", "scenes", "schema", "effects", "view", "sweep"),
     "Look at runs": ("inspect", "certify", "compare", "store"),
-    "Verify": ("verify", "prove", "bench"),
+    "Verify": ("verify", "verify-many", "verify-world", "solvers", "prove", "bench"),
     "The paper": ("reproduce", "report"),
 }
 
@@ -84,7 +87,8 @@ def _app(given: list[str]) -> typer.Typer:
     for name, words in COMMANDS.items():
         group = next(title for title, names in GROUPS.items() if name in names)
         if name == wanted:
-            command = getattr(import_module(f"reports.commands.{name}"), name)
+            file = name.replace("-", "_")
+            command = getattr(import_module(f"reports.commands.{file}"), file)
             app.command(name, rich_help_panel=group)(_answering(command))
         else:
             app.command(name, help=words, rich_help_panel=group)(

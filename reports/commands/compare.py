@@ -1,27 +1,21 @@
-"""`iapb compare`: a scene in several worlds, or IAPB against complementarity on impacts, scenes and
-problem files."""
+"""`iapb compare`: a scene in several worlds."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from iapb.errors import ArgumentError, MissingDependencyError
+from iapb.errors import MissingDependencyError
 from iapb.lazy import needed
-from reference.datasets import problem_files
-from reference.worlds import run_world
 from reports.commands.run import Values, scene_given
+from reports.commands.solvers import as_json_file, facts_of, judgements
 from reports.figures.figure import draw, standalone
 from reports.figures.worlds import worlds as worlds_figure
 from reports.show import Answer, Json, sentence, stage_progress
 from reports.store.io import write_whole
-from verification.check import Topic
-from verification.complementarity.solvers import collections
-from verification.complementarity.topic import complementarity
 from verification.finding import Finding
 from verification.table import Table, titled
 from verification.worlds import compare_worlds
@@ -31,12 +25,9 @@ FOLDER = Path("out/compare")
 
 def compare(
     scene: Annotated[
-        str | None,
-        typer.Argument(
-            help="A scene file, or the name of a scene that comes with the project; without one: IAPB and "
-            "complementarity, on random impacts and the project's scenes."
-        ),
-    ] = None,
+        str,
+        typer.Argument(help="A scene file, or the name of a scene that comes with the project."),
+    ],
     worlds: Annotated[
         str | None,
         typer.Option(
@@ -53,19 +44,6 @@ def compare(
     impacts: Annotated[
         int, typer.Option(min=0, help="Largest number of impacts of SCENE given to every solver.")
     ] = 12,
-    problems: Annotated[
-        list[Path] | None,
-        typer.Option(help="A folder of problem files (LCP, FCLIB) for every solver. Repeatable."),
-    ] = None,
-    only_problems: Annotated[
-        bool,
-        typer.Option(
-            "--only-problems", help="Only the problem files, not the comparison on impacts."
-        ),
-    ] = False,
-    full: Annotated[
-        bool, typer.Option("--full", help="Ten times the impacts, more repeats.")
-    ] = False,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -74,83 +52,30 @@ def compare(
     ] = None,
     json_: Json = False,
 ) -> Answer:
-    """Compare worlds on SCENE; without SCENE, IAPB with complementarity, and solvers on problem
-    files."""
-    if only_problems and not problems:
-        raise typer.BadParameter("give a folder with --problems", param_hint="--only-problems")
-    if out is not None and out.suffix != ".json":
-        raise ArgumentError("--out", str(out), "a file that ends in .json")
-    for given, option in ((worlds, "--worlds"), (against, "--against"), (set_, "--set")):
-        if given and scene is None:
-            raise typer.BadParameter("give a SCENE", param_hint=option)
-    for folder in problems or ():
-        if not problem_files(folder):
-            kinds = ".lcp, .lcp.gz, .dat, .hdf5, .h5"
-            raise ArgumentError("--problems", str(folder), f"a folder with problem files ({kinds})")
-    folders = {str(folder): folder for folder in problems or ()}
+    """Compare worlds on SCENE: distances, energy, time, and its impacts by every solver."""
+    place = as_json_file(out)
     with stage_progress() as progress:
-        if scene is not None:
-            found = compare_worlds(
-                scene_given(scene, set_),
-                worlds.split(",") if worlds else None,
-                against,
-                impacts=impacts,
-                progress=progress,
-            )
-            name = found.details["scene"]
-            lines = _scene_lines(found)
-        else:
-            alone = Topic(
-                key="problems",
-                title="Solvers on problem files",
-                question="",
-                checks=collections({**folders}),
-                says=lambda tables, parts: "",
-            )
-            topic = alone if only_problems else complementarity(folders)
-            found = topic(
-                run_world,
-                "full" if full or only_problems else "quick",
-                partial(progress, topic.title),
-            )
-            name = topic.key
-            lines = _problem_lines(found)
-    place = out or FOLDER / f"{name}.json"
-    new = [part for part in found.parts if part.sentence not in found.answer]
-    lines += [sentence(part.sentence, "• ") for part in new]
-    lines += [f"Not computed: {one.case}: {one.error}: {one.reason}" for one in found.failures]
-    drawn = None
-    if scene is not None:
-        try:
-            needed("matplotlib", "The figure")
-            drawn = draw(worlds_figure, found.tables)
-        except MissingDependencyError as missing:  # the numbers are worth printing without it
-            lines.append(str(missing))
-    if drawn is not None and drawn.panels:
-        write_whole(place.with_suffix(".svg"), standalone(drawn))
-        lines.append(f"Figure: {place.with_suffix('.svg')}")
-    answer = Answer(_facts(found), [*lines, f"Stored in {place}"], 1 if found.failures else 0)
+        found = compare_worlds(
+            scene_given(scene, set_),
+            worlds.split(",") if worlds else None,
+            against,
+            impacts=impacts,
+            progress=progress,
+        )
+    place = place or FOLDER / f"{found.details['scene']}.json"
+    lines = [*_scene_lines(found), *judgements(found)]
+    try:
+        needed("matplotlib", "The figure")
+        drawn = draw(worlds_figure, found.tables)
+    except MissingDependencyError as missing:  # the numbers are worth printing without it
+        lines.append(str(missing))
+    else:
+        if drawn.panels:
+            write_whole(place.with_suffix(".svg"), standalone(drawn))
+            lines.append(f"Figure: {place.with_suffix('.svg')}")
+    answer = Answer(facts_of(found), [*lines, f"Stored in {place}"], 1 if found.failures else 0)
     write_whole(place, answer.text(json_=True))
     return answer
-
-
-def _facts(found: Finding) -> dict[str, Any]:
-    """Return a finding as JSON values: texts, numbers and tables as columns and rows."""
-    parts = [
-        {"name": part.name, "verdict": part.verdict, "sentence": part.sentence}
-        for part in found.parts
-    ]
-    tables = {
-        name: {"columns": table.titles, "rows": table.cells} for name, table in found.tables.items()
-    }
-    return {
-        "question": found.question,
-        "answer": found.answer,
-        "verdict": found.verdict,
-        "parts": parts,
-        "details": dict(found.details),
-        "tables": tables,
-    }
 
 
 def _scene_lines(found: Finding) -> list[str | Table]:
@@ -237,31 +162,3 @@ def _unsolved(problems: Table) -> Iterator[str]:
             filter(None, [f"residual {residual:.1e}" if residual else "", first["note"]])
         )
         yield f"{solver} {outcome} {1 + len(others)}, such as {first['problem']}: {why.removeprefix('refused: ')}"
-
-
-def _problem_lines(found: Finding) -> list[str | Table]:
-    """Return the problems, each with the names of the solvers that did not solve it."""
-    lines: list[str | Table] = []
-    for folder in (name for name, table in found.tables.items() if "why not read" in table.keys):
-        rows = []
-        for row in found.tables[folder].records():
-            unread = row["why not read"] and f"not read: {row['why not read']}"
-            others = ", ".join(
-                f"{name} {said}" for name, said in row.items() if said in ("refused", "failed")
-            )
-            solved = None if unread else sum(said == "solved" for said in row.values())
-            rows.append(
-                (
-                    row["problem"],
-                    row.get("unknowns"),
-                    row.get("rank"),
-                    solved,
-                    unread or others or None,
-                )
-            )
-        lines += [
-            f"{folder}: every solver on every problem",
-            titled(("problem", "unknowns", "rank", "solved by", "not solved by"), rows),
-            "",
-        ]
-    return lines

@@ -117,11 +117,8 @@ REFUSED = [  # status, command line, what the refusal says
     (2, "inspect", "Usage"),
     (2, "inspect run.h5 --impacts -3", "--impacts"),
     (2, "verify --seed -1", "--seed"),
-    (2, "verify --laws restitution --full", "not with --full"),
     (2, "sweep corner_tilt --workers 99999999", "--workers"),
-    (2, "compare --worlds PB", "give a SCENE"),
-    (2, "compare --against PB", "give a SCENE"),
-    (2, "compare --only-problems", "--problems"),
+    (2, "compare --worlds PB", "Usage"),
     (1, "run wrong.yaml", "wrong.yaml:2:"),
     (1, "run wrong.yaml", "bodies[0].joint"),
     (1, "effects wrong.yaml", "wrong.yaml:6:"),
@@ -155,9 +152,9 @@ REFUSED = [  # status, command line, what the refusal says
         (1, f"certify whole.npz --export {name}", "--export")
         for name in ("whole.npz", "link.out", "hard.out", ".")
     ),
-    (1, "compare --only-problems --problems bare", "a folder with problem files"),
+    (1, "solvers bare", "a folder with problem files"),
     (1, "compare peg_corner --worlds ideel", "did you mean ideal?"),
-    (1, "compare --out x.csv", "ends in .json"),
+    (1, "solvers --out x.csv", "ends in .json"),
     (1, "compare peg_corner --against best", "against = 'best'"),
     (1, "sweep corner_tlt", "did you mean corner_tilt?"),
     (1, "prove no_such_statement", "no_such_statement"),
@@ -227,9 +224,9 @@ JSON = {  # of each row in the documents: the status, and a command
     "certify": (0, "certify runs whole.npz"),
     "store again": (0, "store again runs"),
     "sweep": (0, "sweep two.yaml --workers 1 --out sweeps"),
-    "compare": (0, "compare --only-problems --problems given"),
+    "solvers": (0, "solvers given"),
     "verify": (0, "verify --impacts 20 --laws kinetic_energy"),
-    "verify --full": (1, f"verify --full --impacts 20 --workers 1 --resolver {WRONG}"),
+    "verify-many": (1, f"verify-many --impacts 20 --workers 1 --resolver {WRONG}"),
     "prove": (0, "prove theorem_1"),
     "reproduce --figure": (0, "reproduce --figure fig02 --out figures"),
 }
@@ -278,8 +275,8 @@ def test_json_has_the_keys_that_the_documents_list_and_an_error_is_an_object_too
     assert found["store again"]["same"] == 1 == len(found["store again"]["files"])
     assert len(found["sweep"]["points"]) == 2 == found["sweep"]["new"]
     assert (Path(found["sweep"]["folder"]) / "points.nc").is_file()
-    rows = {row[0]: row for row in found["compare"]["tables"]["given"]["rows"]}
-    assert set(found["compare"]["tables"]) == {"given", "profile"} and "not read" in rows["bad.lcp"]
+    rows = {row[0]: row for row in found["solvers"]["tables"]["given"]["rows"]}
+    assert set(found["solvers"]["tables"]) == {"given", "profile"} and "not read" in rows["bad.lcp"]
     assert (
         rows["two.lcp"].count("solved") > 3 and "solved" not in rows["none.lcp"]
     )  # no z has 0 <= z and -z - 1 >= 0

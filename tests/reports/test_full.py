@@ -1,4 +1,4 @@
-"""`iapb verify --full`: what breaks a law is a test or a run, and Ctrl-C tells what was found until
+"""`iapb verify-many`: what breaks a law is a test or a run, and Ctrl-C tells what was found until
 then."""
 
 import json
@@ -8,7 +8,7 @@ import pytest
 
 from iapb import resolve_impact
 from reports.cli import main
-from reports.commands import verify
+from reports.commands import verify_many
 from reports.store import read_run
 from tests.reports.made_up import made_run
 from verification.laws.bounds import LawCount, LawResidual
@@ -24,7 +24,7 @@ from verification.laws.full import (
 )
 from verification.laws.planted import wrong_sign
 
-FULL = ("verify", "--full", "--workers", "1", "--trajectories", "0", "--json")
+FULL = ("verify-many", "--workers", "1", "--trajectories", "0", "--json")
 
 
 def test_a_broken_resolver_is_told_with_a_test_that_fails_as_pasted(capsys):
@@ -64,10 +64,10 @@ def test_ctrl_c_tells_what_was_judged_until_then_and_stores_a_run_that_breaks_a_
         found = (Found("ledger", TRAJECTORIES, 7, None, made_run()),) if batch.first == 0 else ()
         return Outcome(batch.part, (count,), found)
 
-    monkeypatch.setattr(verify, "executor", lambda workers: nullcontext(Here()))
-    monkeypatch.setattr(verify, "_judged", judged)
+    monkeypatch.setattr(verify_many, "executor", lambda workers: nullcontext(Here()))
+    monkeypatch.setattr(verify_many, "_judged", judged)
     monkeypatch.chdir(tmp_path)
-    assert main(["verify", "--full", "--impacts", "20000"]) == 130
+    assert main(["verify-many", "--impacts", "20000"]) == 130
     said = capsys.readouterr().out
     assert "2 of " in said and "then stopped" in said and "BROKEN ledger: 1 of 2 break it" in said
     assert "out/runs/trajectories-seed0-7.h5" in said

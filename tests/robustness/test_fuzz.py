@@ -398,6 +398,9 @@ LINES = (
 )
 LONG = {
     "verify",
+    "verify-many",
+    "verify-world",
+    "solvers",
     "prove",
     "reproduce",
     "compare",
