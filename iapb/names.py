@@ -1,10 +1,16 @@
-"""Messages for unknown names, with the most similar known name."""
+"""Names that a user gives: messages for unknown ones, and objects imported by name,
+``package.module:function``."""
 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+import os
+import sys
+from collections.abc import Callable, Iterable
+from importlib import import_module
 from typing import Any
+
+from iapb.errors import ArgumentError
 
 
 def nearest(wrong: Any, known: Iterable[Any]) -> str:
@@ -25,3 +31,36 @@ def one_of(wrong: Any, known: Iterable[Any], lead: str = "one of ") -> str:
 def in_metres(length: float) -> str:
     """Return a length [m] as text, in millimetres below 1 m."""
     return f"{length:.3g} m" if length >= 1.0 else f"{1e3 * length:.3g} mm"
+
+
+def function_named(argument: str, name: str) -> Callable[..., Any]:
+    """Import a function like `object_named`."""
+    function: Callable[..., Any] = object_named(argument, name, "package.module:function")
+    if not callable(function):
+        raise ArgumentError(argument, name, "something that can be called")
+    return function
+
+
+def object_named(argument: str, name: str, form: str) -> Any:
+    """Import an object, also from the working directory; raise ArgumentError if that fails.
+
+    argument : the option or argument that the name was given for
+    form : the expected form of the name
+    """
+    module, colon, attribute = name.partition(":")
+    if not (module and colon and attribute):
+        raise ArgumentError(argument, name, form)
+    if os.getcwd() not in sys.path:
+        sys.path.insert(0, os.getcwd())
+    try:
+        home = import_module(module)
+    except Exception as error:  # a user's module may raise anything
+        why = f"{type(error).__name__}: {error}"
+        raise ArgumentError(argument, name, f"a module that can be imported ({why})") from error
+    if not hasattr(home, attribute):
+        near = nearest(attribute, [word for word in dir(home) if not word.startswith("_")])
+        guess = f"; did you mean {near}?" if near else ""
+        raise ArgumentError(
+            argument, name, f"a name of the module {module}, which has no {attribute}{guess}"
+        )
+    return getattr(home, attribute)

@@ -8,13 +8,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from iapb.by_name import object_named
 from iapb.contact.laws import ImpulseAugmented, Penalty
 from iapb.engines import Engine, is_engine
 from iapb.errors import ArgumentError
 from iapb.haptics.coupling import Coupling
 from iapb.lazy import load_extensions
-from iapb.names import one_of
+from iapb.names import object_named, one_of
 from iapb.scene import Scene
 from iapb.system import coupling_of
 

@@ -7,7 +7,6 @@ frame Jacobians give the rows nᵀ(J_a − J_b), (11)-(12). Nothing here calls t
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import product
 from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
 
@@ -16,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.contact.finding import Contacts
-from iapb.contact.geometry import BOX, ENDLESS, POLYGON, Shapes
 from iapb.mechanics.mechanism import Mechanism
 from reference import Floats
 from reference.rigid_body import PinocchioMechanism, model_of
@@ -52,7 +50,9 @@ def find_rows(system: Any, q: Floats, v: Floats, margin: float) -> ContactRows:
     axes, origins, frames = mechanics_of(system).bodies(q)
     geometry = system.finder.find(axes, origins, margin)
     if (geometry.gap > 0.0).any():
-        geometry = _without_grazing(geometry, _solids_of(system), axes, origins)
+        solids = _solids_of(system).placed(axes, origins)
+        grazing = _grazing(geometry.shape_a, geometry.shape_b, geometry.gap, solids)
+        geometry = Contacts(*(column[~grazing] for column in geometry))
     if len(system.stops.bound):
         geometry = _with_stops(geometry, system, q, origins, frames, margin)
     rows = contact_jacobian(geometry.normal, geometry, origins, frames)
@@ -60,108 +60,78 @@ def find_rows(system: Any, q: Floats, v: Floats, margin: float) -> ContactRows:
 
 
 class _Solids(NamedTuple):
-    """Corners and faces of all shapes in the axes of their bodies; a ball has one corner.
-
-    Shape s has the corners `first_corner[s]` to `first_corner[s + 1]`, and its faces likewise.
-    """
+    """Corners and faces of all shapes, one after another; a ball has one corner, a plane none."""
 
     radius: Floats  # (n,) [m] of a ball, else 0
-    size: Floats  # (n,) [m], infinite for planes
-    first_corner: NDArray[np.int64]  # (n + 1,)
-    corner_body: NDArray[np.int32]  # (k,)
+    size: Floats  # (n,) [m]
     corner: Floats  # (k, 3)
-    first_face: NDArray[np.int64]  # (n + 1,)
-    face_body: NDArray[np.int32]  # (f,)
-    face_point: Floats  # (f, 3)
-    face_normal: Floats  # (f, 3) outward
+    face: Floats  # (f, 3) outward normals
+    offset: Floats  # (f,) [m] n·x of the points of a face
+    corners: NDArray[np.int64]  # (n + 1,) the first corner of each shape
+    faces: NDArray[np.int64]  # (n + 1,)
+    corner_body: NDArray[np.int64]  # (k,)
+    face_body: NDArray[np.int64]  # (f,)
+
+    def placed(self, axes: Floats, origins: Floats) -> _Solids:
+        """Return the shapes in the world, from the axes of their bodies."""
+        turned = np.einsum("nij,nj->ni", axes[self.corner_body], self.corner)
+        face = np.einsum("nij,nj->ni", axes[self.face_body], self.face)
+        return self._replace(
+            corner=turned + origins[self.corner_body],
+            face=face,
+            offset=self.offset + (face * origins[self.face_body]).sum(axis=1),
+        )
 
 
 def _solids_of(system: Any) -> _Solids:
-    """Return the corners and faces of the system's shapes, computed once."""
-    if system.mechanism not in _solids:
-        _solids[system.mechanism] = _corners_and_faces(system.shapes)
-    return _solids[system.mechanism]
-
-
-def _corners_and_faces(shapes: Shapes) -> _Solids:
-    corners = list[Floats]()
-    points = list[Floats]()
-    normals = list[Floats]()
-    for s, kind in enumerate(shapes.kind):
-        middle = shapes.center[s]
-        corner = middle[None]
-        normal = np.zeros((0, 3))
-        if kind == POLYGON:
-            rows = slice(shapes.first[s], shapes.first[s] + shapes.count[s])
-            corner = np.pad(shapes.vertices[rows], ((0, 0), (0, 1)))
-            edge = np.roll(corner, -1, axis=0) - corner
-            normal = np.cross(edge, [0.0, 0.0, 1.0])
-            normal /= np.linalg.norm(normal, axis=1)[:, None]
-        elif kind == BOX:
-            arms = shapes.axes[s] * shapes.half_size[s]
-            signs = np.array(list(product((-1.0, 1.0), repeat=3)))
-            corner = middle + signs @ arms.T
-            normal = np.concatenate([shapes.axes[s].T, -shapes.axes[s].T])
-        corners.append(corner)
-        normals.append(normal)
-        on_face = np.argmax(normal @ corner.T, axis=1)
-        points.append(corner[on_face])
-    number_of_corners = [len(each) for each in corners]
-    number_of_faces = [len(each) for each in normals]
-    extent = np.array([np.ptp(each, axis=0).max() for each in corners])
-    extent[np.isin(shapes.kind, ENDLESS)] = np.inf  # nothing grazes a plane
-    return _Solids(
-        shapes.radius,
-        extent + shapes.radius,
-        np.cumsum([0, *number_of_corners]),
-        np.repeat(shapes.body, number_of_corners),
-        np.concatenate(corners),
-        np.cumsum([0, *number_of_faces]),
-        np.repeat(shapes.body, number_of_faces),
-        np.concatenate(points),
-        np.concatenate(normals),
+    """Return the shapes in the axes of their bodies, made once."""
+    if system.mechanism in _solids:
+        return _solids[system.mechanism]
+    number = len(system.shapes.kind)
+    corner = [np.zeros((0, 3))]
+    face = [np.zeros((0, 3))]
+    offset = [np.zeros(0)]
+    corners = np.zeros(number, np.int64)
+    faces = np.zeros(number, np.int64)
+    size = np.zeros(number)
+    for s, solid in system.solids.items():
+        points = solid.points if solid.radius > 0.0 else solid.points[1:]
+        corner.append(points)
+        face.append(solid.normals)
+        offset.append(solid.offsets)
+        corners[s] = len(points)
+        faces[s] = len(solid.normals)
+        size[s] = solid.reach
+    made = _Solids(
+        system.shapes.radius,
+        size,
+        np.concatenate(corner),
+        np.concatenate(face),
+        np.concatenate(offset),
+        np.cumsum([0, *corners]),
+        np.cumsum([0, *faces]),
+        np.repeat(system.shapes.body, corners),
+        np.repeat(system.shapes.body, faces),
     )
-
-
-def _without_grazing(found: Contacts, solids: _Solids, axes: Floats, origins: Floats) -> Contacts:
-    """Leave out contacts that are apart and just reach the plane of a face."""
-
-    def placed(points: Floats, body: NDArray[np.int32]) -> Floats:
-        return np.asarray(np.einsum("nij,nj->ni", axes[body], points) + origins[body])
-
-    grazing = _grazing(
-        found.shape_a,
-        found.shape_b,
-        found.gap,
-        solids.radius,
-        solids.size,
-        solids.first_corner,
-        placed(solids.corner, solids.corner_body),
-        solids.first_face,
-        placed(solids.face_point, solids.face_body),
-        np.einsum("nij,nj->ni", axes[solids.face_body], solids.face_normal),
-    )
-    return Contacts(*(column[~grazing] for column in found))
+    return _solids.setdefault(system.mechanism, made)
 
 
 @numba.njit(cache=True, fastmath=False)
-def _grazing(  # type: ignore[no-untyped-def]
-    shape_a, shape_b, gap, radius, size, first_corner, corner, first_face, face_point, face_normal
-):
+def _grazing(shape_a, shape_b, gap, solids):  # type: ignore[no-untyped-def]
     """Return whether each contact (c,) is between shapes that graze."""
     grazes = np.zeros(len(gap), np.bool_)
     for c in range(len(gap)):
-        near = GRAZE * (size[shape_a[c]] + size[shape_b[c]])
+        near = GRAZE * (solids.size[shape_a[c]] + solids.size[shape_b[c]])
         for side in range(2 if gap[c] > near else 0):
             one, other = (shape_a[c], shape_b[c]) if side == 0 else (shape_b[c], shape_a[c])
-            for f in range(first_face[one], first_face[one + 1]):
+            for f in range(solids.faces[one], solids.faces[one + 1]):
                 lowest = np.inf
-                for k in range(first_corner[other], first_corner[other + 1]):
-                    height = 0.0
+                for k in range(solids.corners[other], solids.corners[other + 1]):
+                    height = -solids.offset[f]
                     for i in range(3):
-                        height += (corner[k, i] - face_point[f, i]) * face_normal[f, i]
+                        height += solids.corner[k, i] * solids.face[f, i]
                     lowest = min(lowest, height)
-                grazes[c] |= abs(lowest - radius[other]) <= near
+                grazes[c] |= abs(lowest - solids.radius[other]) <= near
     return grazes
 
 

@@ -86,26 +86,29 @@ class RigidStep(NamedTuple):
     restitution_law: str = NEWTON  #: "Newton" or "Poisson", the law that the step used
 
 
+class StepContacts(NamedTuple):
+    """The c contacts of a step."""
+
+    jacobian: Floats  #: (c, d) unit-normal rows
+    gap: Floats  #: (c,) [m]
+    restitution: float | Floats  #: e in [0, 1], one for all contacts or (c,)
+    #: share in [0, 1] of an overlap that this step removes (0: none, as in Moreau's step), one for
+    #: all contacts or (c,)
+    stabilization: float | Floats = 0.0
+
+
 def rigid_step(
     mass_matrix: Floats,
     velocity: Floats,
     force: Floats,
     dt: float,
-    contact_jacobian: Floats,
-    gap: Floats,
-    gamma_minus: Floats,
-    restitution: float | Floats,
-    stabilization: float | Floats = 0.0,
+    contacts: StepContacts,
     scheme: str = "automatic",
 ) -> RigidStep:
     """Advance v (d,) by dt [s] under generalized force f (d,) and unilateral contacts.
 
     Parameters
     ----------
-    contact_jacobian : (c, d) unit-normal rows; gap : (c,) [m]; gamma_minus : (c,) J v [m/s]
-    restitution : e in [0, 1], one for all contacts or (c,)
-    stabilization : share in [0, 1] of an overlap that this step removes (0: none, as in Moreau's
-        step), one for all contacts or (c,)
     scheme : "moreau" ignores open contacts; "stewart-trinkle" keeps them from penetrating, with
         Poisson's law if e > 0; "automatic" treats an open contact as Stewart-Trinkle's step if its
         e = 0 and as Moreau's if e > 0
@@ -119,6 +122,8 @@ def rigid_step(
         No solver reaches a residual of STEP_TOLERANCE; the message gives the number of contacts and
         each solver's text.
     """
+    contact_jacobian, gap, restitution, stabilization = contacts
+    gamma_minus = contact_jacobian @ velocity
     bounces = bool(np.any(restitution))
     bound = velocity_bounds(gap, gamma_minus, restitution, dt, stabilization, scheme)
     v_free = velocity + dt * solve_mass(mass_matrix, force)

@@ -28,7 +28,14 @@ from iapb.scene.mechanism import restitution_by_pair
 from reference import Floats, contact_rows
 from reference.free_motion import free_motion
 from reference.one_thread import one_thread
-from reference.rigid_step import FRICTION_LAWS, SCHEMES, friction_step, rigid_step, velocity_bounds
+from reference.rigid_step import (
+    FRICTION_LAWS,
+    SCHEMES,
+    StepContacts,
+    friction_step,
+    rigid_step,
+    velocity_bounds,
+)
 
 # Entries of J in one step, which then takes 4 GB and about 15 s. 320 circles on a floor reach this
 # limit.
@@ -211,18 +218,8 @@ class RigidConstraints:
             scheme = "stewart-trinkle" if scheme == "automatic" else scheme
         removed = np.maximum(self.stabilization, np.where(np.equal(e, 0.0), removed, 0.0))
         if self.friction == "none" or not table.any():
-            step = rigid_step(
-                mass,
-                v,
-                force,
-                dt,
-                found.jacobian,
-                found.gap,
-                found.gamma,
-                e,
-                removed,
-                scheme,
-            )
+            contacts = StepContacts(found.jacobian, found.gap, e, removed)
+            step = rigid_step(mass, v, force, dt, contacts, scheme)
             return _Solved(
                 step.velocity,
                 step.impulse,

@@ -15,7 +15,7 @@ import numpy as np
 
 from iapb.contact.kernels.implicit import FADING
 from iapb.contact.solids import Solid, joined
-from iapb.mechanics.energy import FORCES, energy_ledger, lost_within, moved_straight
+from iapb.mechanics.energy import FORCES, Steps, energy_ledger, lost_within, moved_straight
 from iapb.mechanics.joints import KINDS
 from iapb.mechanics.rotations import rotation_of
 from iapb.names import in_metres
@@ -175,9 +175,8 @@ def _books(seen: _Seen) -> Iterator[_Book]:
         forces = {name: getattr(run, f"{name}_force")[begin:, dofs] for name in FORCES}
         states = run.q[begin:, q : q + alone.nq], run.v[begin:, dofs]
         impulse = np.ascontiguousarray(run.impulse[begin:, dofs])
-        ledgers[t] = energy_ledger(
-            alone, seen.gravity, *states, forces, impulse, straight=moved_straight(run)
-        )
+        steps = Steps(*states, forces, impulse, moved_straight(run))
+        ledgers[t] = energy_ledger(alone, seen.gravity, steps)
     touching = np.stack([run.contacts.body_a, run.contacts.body_b])[:, run.contacts.body_b >= 0]
     group = joined(len(ranges), np.unique(trees[touching], axis=1).T)
     for chosen in (np.flatnonzero(group == g) for g in np.unique(group)):

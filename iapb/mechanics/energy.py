@@ -18,6 +18,7 @@ energy changes by F . (v_k + v_k+1) / 2 dt (constant M): it loses F . M^-1 F dt^
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -65,37 +66,37 @@ def impact_losses(mechanism: Mechanism, q: Floats, v: Floats, impulse: Floats) -
     return losses
 
 
+class Steps(NamedTuple):
+    """n steps of a mechanism."""
+
+    #: (n + 1, nq) and (n + 1, d): states at the beginning of each step and at the end of the last
+    q: Floats
+    v: Floats
+    #: name -> (n, d) [N, N m]: generalized forces over each step; gravity is not among them
+    forces: Mapping[str, Floats]
+    impulse: Floats  #: (n, d) [N s, N m s] at the beginning of each step
+    #: whether free bodies moved straight, by the integrator `momentum` (see
+    #: `Mechanism.displacements`)
+    straight: bool = False
+    #: (n,) [J] lost in the impacts of each step, where these happen within it; NaN: it follows from
+    #: the impulse, at the beginning of the step
+    lost: Floats | None = None
+
+
 def energy_ledger(
     mechanism: Mechanism,
     gravity: ArrayLike,
-    q: Floats,
-    v: Floats,
-    forces: Mapping[str, Floats],
-    impulse: Floats,
+    steps: Steps,
     before: Mapping[str, float] | None = None,
-    straight: bool = False,
-    lost: Floats | None = None,
 ) -> dict[str, Floats]:
     """Return the energy balance of n steps.
 
     Parameters
     ----------
-    mechanism : Mechanism
     gravity : (3,) [m/s^2]
-    q, v : (n + 1, nq), (n + 1, d)
-        States at the beginning of each step and at the end of the last.
-    forces : name -> (n, d) [N, N m]
-        Generalized forces on the mechanism over each step; gravity is not among them.
-    impulse : (n, d) [N s, N m s]
-        Generalized impulse at the beginning of each step.
     before : ledger name -> [J], optional
         Sums at the end of the preceding steps (see `last_of`); the sums of these n steps continue
         them.
-    straight : whether free bodies moved straight, by the integrator `momentum` (see
-        `Mechanism.displacements`)
-    lost : (n,) [J], optional
-        Energy lost in the impacts of each step, where these happen within it; NaN: it follows from
-        the impulse, at the beginning of the step.
 
     Returns
     -------
@@ -108,6 +109,7 @@ def energy_ledger(
     ArgumentError
         Shapes of arrays that do not agree.
     """
+    q, v, forces, impulse, straight, lost = steps
     kinetic, potential = mechanism.energies(q, v, gravity)
     displacement = mechanism.displacements(q, straight)
     before = before or {}
@@ -174,17 +176,8 @@ def energy_of_run(
     """
     forces = {name: getattr(run, f"{name}_force") for name in FORCES}
     before = before or {}
-    ledger = energy_ledger(
-        mechanism,
-        gravity,
-        run.q,
-        run.v,
-        forces,
-        run.impulse,
-        before,
-        moved_straight(run),
-        lost_within(run),
-    )
+    steps = Steps(run.q, run.v, forces, run.impulse, moved_straight(run), lost_within(run))
+    ledger = energy_ledger(mechanism, gravity, steps, before)
     if device is not None and run.device_q.shape[1]:
         moved = device.displacements(run.device_q)
         ledger["device_kinetic"], _ = device.energies(run.device_q, run.device_v, gravity)

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from iapb.by_name import function_named
+from iapb.names import function_named
 from reports.show import Answer, Json, stage_progress
 from verification import check_passivity
 from verification.laws import CONTRACTS

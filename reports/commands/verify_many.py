@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from iapb.by_name import function_named
+from iapb.names import function_named
 from reports.commands.verify import ENGINE
 from reports.show import Answer, Json, stage_progress
 from reports.store import write_run

@@ -44,6 +44,7 @@ READ = {
         "restitutions",
         "scene",
         "shapes",
+        "solids",
         "start",
         "stops",
         "tool_dofs",
