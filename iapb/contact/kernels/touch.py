@@ -239,43 +239,39 @@ def link(world, state, body, other):
 def keep_start(state):
     """Keep the start of the step, after its impacts, and the end of the whole step."""
     cut = state.cut
-    counts = state.contact_count
-    copy_into(cut.v, state.start_v)
-    copy_into(cut.impulse, state.impulse)
-    copy_into(cut.contact_impulse, state.contact_impulse)
-    copy_into(cut.group, state.group_of_tree)
-    copy_into(cut.state, state.state_of_tree)
-    copy_into(cut.spreading, state.spreading)
-    copy_into(cut.rests, state.rests)
+    copy_start(cut.start, state, state.contact_count[0])
+    copy_into(cut.start.v, state.start_v)
     copy_into(cut.end_q, state.q)
     copy_into(cut.end_v, state.v)
     copy_into(cut.end_penalty, state.penalty_force)
     copy_into(cut.end_friction, state.friction_force)
-    cut.numbers[0] = counts[0]
-    cut.numbers[1] = counts[1]
-    cut.numbers[2] = state.impacts.logged[0]
-    for i in range(counts[0]):
-        copy_all(cut.contacts, i, state.contacts, i)
-    for i in range(counts[1]):
-        copy_all(cut.previous, i, state.previous, i)
+    cut.start.impacts[0] = state.impacts.logged[0]
+    for i in range(state.contact_count[1]):
+        copy_all(cut.start.previous, i, state.previous, i)
 
 
 @kernel
 def back_to_start(state):
     """Take back what parts of the step have changed, but for q and v."""
-    cut = state.cut
-    copy_into(state.impulse, cut.impulse)
-    copy_into(state.contact_impulse, cut.contact_impulse)
-    copy_into(state.group_of_tree, cut.group)
-    copy_into(state.state_of_tree, cut.state)
-    copy_into(state.spreading, cut.spreading)
-    copy_into(state.rests, cut.rests)
-    state.contact_count[0] = cut.numbers[0]
-    state.impacts.logged[0] = cut.numbers[2]
-    for t in range(cut.struck.shape[0]):
-        cut.struck[t] = state.state_of_tree[t] == COLLIDING
-    for i in range(cut.numbers[0]):
-        copy_all(state.contacts, i, cut.contacts, i)
+    start = state.cut.start
+    copy_start(state, start, start.contact_count[0])
+    state.impacts.logged[0] = start.impacts[0]
+    for t in range(state.cut.struck.shape[0]):
+        state.cut.struck[t] = state.state_of_tree[t] == COLLIDING
+
+
+@kernel
+def copy_start(to, given, count):
+    """Copy what a part of a step changes; the first `count` contacts."""
+    copy_into(to.impulse, given.impulse)
+    copy_into(to.contact_impulse, given.contact_impulse)
+    copy_into(to.contact_count, given.contact_count)
+    copy_into(to.group_of_tree, given.group_of_tree)
+    copy_into(to.state_of_tree, given.state_of_tree)
+    copy_into(to.spreading, given.spreading)
+    copy_into(to.rests, given.rests)
+    for i in range(count):
+        copy_all(to.contacts, i, given.contacts, i)
 
 
 @kernel
@@ -342,11 +338,11 @@ def begin_component(world, state, root):
         size += state.moving[t]
     for i in range(state.contact_count[0]):
         state.contacts.idle[i] = not takes_part(world, state, state.contacts, i)
-    state.contact_count[1] = cut.numbers[1]
-    for i in range(cut.numbers[1]):
-        copy_all(state.previous, i, cut.previous, i)
-    copy_into(cut.part_q, cut.q)
-    copy_into(cut.part_v, cut.v)
+    state.contact_count[1] = cut.start.contact_count[1]
+    for i in range(state.contact_count[1]):
+        copy_all(state.previous, i, cut.start.previous, i)
+    copy_into(cut.part_q, cut.start.q)
+    copy_into(cut.part_v, cut.start.v)
     cut.elapsed[0] = 0.0
     cut.penalty[:] = cut.friction[:] = 0.0
     return size

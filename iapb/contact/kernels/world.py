@@ -107,23 +107,30 @@ class World(NamedTuple):
     free: FreeMotion
 
 
-class Cut(NamedTuple):
-    """Scratch of a step that is cut: its start, after the impacts there, and its end."""
+class StepStart(NamedTuple):
+    """The start of a step that is cut, after the impacts there: with the names of `State`."""
 
-    arriving: Annotated[Integers, "1"]  # contacts at the end of the step in `State.arriving`, or −1
-    elapsed: Annotated[Floats, "1"]  # [s] since the start of the step
-    whole: Annotated[Integers, "1"]  # a tree whose group is never cut, −1 = none
     q: Annotated[Floats, "coordinate"]
     v: Annotated[Floats, "velocity"]
     impulse: Annotated[Floats, "velocity"]
     contact_impulse: Annotated[Floats, "row"]
-    numbers: Annotated[Integers, "3"]  # contacts, contacts before, impacts logged
+    contact_count: Annotated[Integers, "2"]
+    impacts: Annotated[Integers, "1"]  # lines of their log
     contacts: ContactBuffer
     previous: ContactBuffer
-    group: Annotated[Integers, "tree"]
-    state: Annotated[States, "tree"]
+    group_of_tree: Annotated[Integers, "tree"]
+    state_of_tree: Annotated[States, "tree"]
     spreading: Annotated[Booleans, "tree"]
     rests: Annotated[Booleans, "tree"]
+
+
+class Cut(NamedTuple):
+    """Scratch of a step that is cut: its start, its end, and its parts."""
+
+    arriving: Annotated[Integers, "1"]  # contacts at the end of the step in `State.arriving`, or −1
+    elapsed: Annotated[Floats, "1"]  # [s] since the start of the step
+    whole: Annotated[Integers, "1"]  # a tree whose group is never cut, −1 = none
+    start: StepStart
     struck: Annotated[Booleans, "tree"]  # in some part of the step
     end_q: Annotated[Floats, "coordinate"]
     end_v: Annotated[Floats, "velocity"]

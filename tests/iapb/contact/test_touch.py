@@ -128,6 +128,23 @@ def test_impacts_at_steps_miss_it_by_far() -> None:
     assert np.abs(simulate(scene_from_text(text)).q[-1] - truth).max() > 1e3 * EXACT
 
 
+@pytest.mark.parametrize("rate", [250.0, 1000.0])
+@pytest.mark.parametrize("tilt", [0.2, -0.35])
+def test_a_box_that_tips_over_one_corner_lands_on_the_other_where_that_touches(
+    rate: float, tilt: float
+) -> None:
+    """The two bodies are in contact all the time; the second corner still strikes at gap zero."""
+    state = np.array([0.0, 0.0, tilt, 0.0, 0.0, 0.0])
+    state[1] = -heights(state[:3], state[3:], 0.0).min()
+    text = toss_text(state, rate, friction=1.0, seconds=0.3).replace(
+        "restitution: 0.6", "restitution: 0"
+    )
+    run = simulate(scene_from_text(text))
+    lands = 3 if tilt > 0.0 else 2
+    above = np.array([heights(q, np.zeros(3), 0.0)[lands] for q in run.impacts.q])
+    assert abs(above[above < 2e-3][0]) < EXACT
+
+
 def bouncing(more: str = "", rate: float = 1000.0, seconds: float = 1.0) -> str:
     return f"""name: ball
 rate: {rate}
