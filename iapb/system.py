@@ -36,6 +36,8 @@ from iapb.scene import mechanism as scene_parts
 
 _factored = Entry(cholesky)
 
+# effects with which contacts are looked for
+_OF_CONTACTS = ("wall_contacts", "body_contacts", "self_collisions", "joint_limits")
 _CONTACT_NUMBERS = (
     "friction_velocity",
     "approach_velocity",
@@ -126,9 +128,9 @@ class System:
         key = law.impulses, law.integrator, law.rendering, law.friction_in_impacts, law.pushing
         if key in self._worlds:
             return self._worlds[key]
-        limit = np.full(mechanism.nv, np.inf)
         on = active_names(self.decide(law) if effects is None else effects)
         scaled = "device_limits" in on and law.rendering in ("scale", "spread")
+        limit = np.full(mechanism.nv, np.inf)
         if scaled and scene.device is not None:
             limit[slice(*self.tool_dofs)] = scene.device.force_limit
         switches = Switches(
@@ -136,12 +138,14 @@ class System:
             pushing=law.impulses and law.pushing,
             impulse_limit=scaled,
             spreading=scaled and law.rendering == "spread",
-            contacts=not on.isdisjoint(
-                ("wall_contacts", "body_contacts", "self_collisions", "joint_limits")
-            ),
+            contacts=not on.isdisjoint(_OF_CONTACTS),
         )
         ranges = np.array(mechanism.tree_dofs, np.int64).reshape(-1, 2)
         own = [0 if body.mimic else body.joint.layout.nq for body in mechanism.bodies]
+        stiffness, damping = contact.gains
+        restitution = contact.restitution
+        if len(self.restitutions) == 1:
+            restitution = self.restitutions[0]
         world: Any = block(
             World(
                 mechanism=mechanism.block,
@@ -159,16 +163,14 @@ class System:
                 dt=self.dt,
                 gravity=self.gravity,
                 rigid=contact.rigid,
-                stiffness=contact.gains[0],
-                damping=contact.gains[1],
+                stiffness=stiffness,
+                damping=damping,
                 **{name: float(getattr(contact, name)) for name in _CONTACT_NUMBERS},
                 clamped=contact.penalty == "clamped",
                 friction_class=self.frictions.class_of_shape,
                 friction=self.frictions.table,
                 tangents=self.tangents,
-                restitution=float(
-                    self.restitutions[0] if len(self.restitutions) == 1 else contact.restitution
-                ),
+                restitution=float(restitution),
                 own_restitution=scene_parts.restitution_by_shape(scene),
                 per_body_rows=contact.self_collision_rows == "per_body",
                 joint_damping=self.joint_damping,
@@ -212,40 +214,24 @@ class System:
         largest = max((stop - start for start, stop in mechanism.tree_dofs), default=0)
         per_body = contact.self_collision_rows == "per_body"
         rows = c * (2 if per_body else 1)  # (13)-(14): two each
-        sliding = (
-            scene.largest_friction > 0.0 and not per_body
-        )  # per-body rows have no slip: no friction in impacts
+        # per-body rows have no slip: no friction in impacts
+        sliding = scene.largest_friction > 0.0 and not per_body
         soft = contact.forces == "implicit" or bool(self.joint_friction.any())
         uneven = len(self.restitutions) > 1
-        log = blank(
-            IMPACTS[1:], {"impact": self.most_impacts, "coordinate": mechanism.nq, "velocity": d}
-        )
-        for name, value in {
-            "scale": 1,
-            "clamp": 1,
-            "friction_share": 1,
-            "solved": 1,
-            "approaching": -1,
-        }.items():
-            log[name][:] = value  # where a law written in Python does not set it
+        lengths = {"coordinate": mechanism.nq, "velocity": d, "tree": trees, "row": rows}
+        log = blank(IMPACTS[1:], lengths | {"impact": self.most_impacts})
+        # where a law written in Python does not set it
+        for name in ("scale", "clamp", "friction_share", "solved"):
+            log[name][:] = 1
+        log["approaching"][:] = -1
         state = State(
-            **blank(
-                quantities(State),
-                {"coordinate": mechanism.nq, "velocity": d, "tree": trees, "row": rows},
-            ),
+            **blank(quantities(State), lengths),
             body=make_workspace(len(mechanism.bodies), mechanism.motions),
             contacts=zeros_of(ContactBuffer, contact=c),
             previous=zeros_of(ContactBuffer, contact=c),
             scratch_contacts=zeros_of(ContactBuffer, contact=c),
             arriving=zeros_of(ContactBuffer, contact=c * contact.at_touch),
-            cut=zeros_of(
-                Cut,
-                coordinate=mechanism.nq,
-                velocity=d,
-                tree=trees,
-                row=rows,
-                contact=c * contact.at_touch,
-            ),
+            cut=zeros_of(Cut, contact=c * contact.at_touch, **lengths),
             work=zeros_of(ImpactWork, velocity=d, row=rows),
             push_work=zeros_of(PushWork, velocity=d, row=rows),
             share_work=zeros_of(ShareWork, velocity=(rows + 1) * uneven, row=rows * uneven),
@@ -298,8 +284,8 @@ class System:
         on = active_names(self.decide(ImpulseAugmented(), coupling) if effects is None else effects)
         on -= {"delay", "quantisation"} if external else set()
         device = self.mechanism if hand is None else self.device_mechanism()
-        (v_start, v_stop) = self.tool_dofs
-        (q_start, q_stop) = self.tool_coordinates
+        v_start, v_stop = self.tool_dofs
+        q_start, q_stop = self.tool_coordinates
         lengths = {
             "velocity": d,
             "tool": v_stop - v_start,

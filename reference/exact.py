@@ -213,7 +213,7 @@ def bulk_energy_gain(
     """
     before, after = (np.atleast_2d(np.asarray(v, np.float64)) for v in (v_minus, v_plus))
     masses = np.asarray(mass_matrix, np.float64)
-    (n, d) = before.shape
+    n, d = before.shape
     if after.shape != before.shape:
         raise ArgumentError("v_plus", after.shape, f"shape {before.shape}, as v_minus")
     if masses.shape not in ((d, d), (n, d, d)):
@@ -282,8 +282,8 @@ def _bilinear(
     """Return aᵀ M b (n,) as a double-double, and the sum of |a_i M_ij b_j|, for double-double
     vectors a and b (n, d)."""
     n, d, _ = masses.shape
-    (a_high, a_low) = a
-    (b_high, b_low) = b
+    a_high, a_low = a
+    b_high, b_low = b
     felt = _multiply(b_high[:, None, :], b_low[:, None, :], masses, 0.0)
     terms = _multiply(a_high[:, :, None], a_low[:, :, None], *felt)
     size = np.abs(terms[0]).sum(axis=(1, 2))

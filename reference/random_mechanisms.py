@@ -52,7 +52,7 @@ def random_mechanism(
             parent = chain[-1] if chain else None
             kind = str(rng.choice(kinds))
             mass = 10.0 ** rng.uniform(*MASS_DECADES)
-            (x, y, z) = rng.normal(size=3).tolist()
+            x, y, z = rng.normal(size=3).tolist()
             place = (random_rotation(rng), rng.normal(scale=0.5, size=3))
             center = rng.normal(scale=0.3, size=3)
             bodies.append(

@@ -205,7 +205,7 @@ class RigidConstraints:
         found: contact_rows.ContactRows,
         removed: Floats,
     ) -> _Solved:
-        (classes, table) = system.frictions
+        classes, table = system.frictions
         values = system.restitutions
         shapes = found.geometry[:2]
         scheme = self.scheme

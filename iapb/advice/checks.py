@@ -30,7 +30,7 @@ from iapb.numerics.schema import Floats, Integers
 from iapb.scene import Scene, SpatialScene, mechanism
 from iapb.scene.bodies import inertia_matrix
 from iapb.scene.model import MAX_RATE, Gains, Hand
-from iapb.system import System, system_of
+from iapb.system import system_of
 
 Rows = Integers  # numbers of contacts
 
@@ -83,7 +83,7 @@ class StepLimits:
 
 class Start:
     """A scene at its start: its closest contacts and joint limits, with their rows, effective
-    masses and loads.
+    masses and loads; each quantity is computed when it is asked for.
 
     A joint limit is a contact with one number, after those of the shapes, in place of its two
     shapes.
@@ -93,55 +93,57 @@ class Start:
         mechanism.require_joints(scene)
         system = system_of(scene)
         self.scene = scene
+        self.system = system
         self.dt = system.dt
         self.spatial = isinstance(scene, SpatialScene)
         self.mechanism = system.mechanism
         self.q, self.v = system.start
-        self.shapes = system.shapes
         self.pairs = system.pairs
         self.stops = system.stops
         self.gravity = system.gravity
-        self.labels = mechanism.shape_names(scene)
-        solids = system.solids
-        trees = self.mechanism.tree_of_body
-        size = [solids[i].thin if i in solids else math.inf for i in range(len(self.labels))]
-        ranges = mechanism.limits_of(scene)
-        for b, sign, arm in zip(
-            self.stops.body.tolist(), self.stops.sign, self.stops.arm.tolist(), strict=True
-        ):
-            self.labels.append(
-                f"the {'lower' if sign > 0.0 else 'upper'} limit of {scene.bodies[b].name}"
-            )
-            size.append(arm * float(np.ptp(ranges[b] or (0.0,))))
-        none = np.full(len(self.stops.body), -1)
-        self.kind, self.radius = (
-            np.append(self.shapes.kind, none),
-            np.append(self.shapes.radius, none),
-        )
-        # contacts: trees (at a wall twice the same), Jacobian rows J (c, d), friction, thickness of
-        # the thinner
-        self.found = found = self._contacts(system, size[: len(self.shapes.kind)])
-        self.tree_a = trees[found.body_a]
-        self.tree_b = trees[np.where(found.body_b < 0, found.body_a, found.body_b)]
-        self.rows = self.rows_along(np.arange(len(found.gap)), found.normal)
-        self.first_stop = len(self.rows) - len(none)
-        self.rows[np.arange(self.first_stop, len(self.rows)), self.stops.dof] = (
-            self.stops.arm * self.stops.sign
-        )
-        classes, table = system.frictions
-        self.friction = table[classes[found.shape_a], classes[found.shape_b]]
-        self.size = np.array(size)
-        self.thickness = np.minimum(self.size[found.shape_a], self.size[found.shape_b])
+        self.first_stop = len(self.found.gap) - len(self.stops.body)
 
-    def _contacts(self, system: System, sizes: list[float]) -> Contacts:
-        """Return the contacts between the closest features of each pair, near or far, and those of
-        joint limits."""
+    @cached_property
+    def labels(self) -> list[str]:
+        """Name of each shape, and of each joint limit."""
+        names = mechanism.shape_names(self.scene)
+        for body, sign in zip(self.stops.body.tolist(), self.stops.sign, strict=True):
+            side = "lower" if sign > 0.0 else "upper"
+            names.append(f"the {side} limit of {self.scene.bodies[body].name}")
+        return names
+
+    @cached_property
+    def size(self) -> Floats:
+        """Smallest extent of each shape, infinite for walls; of a joint limit the joint's range
+        [m]."""
+        extents = np.full(len(self.system.shapes.kind), math.inf)
+        for i, solid in self.system.solids.items():
+            extents[i] = solid.thin
+        limits = mechanism.limits_of(self.scene)
+        ranges = [float(np.ptp(limits[body] or (0.0,))) for body in self.stops.body.tolist()]
+        return np.concatenate([extents, self.stops.arm * ranges])
+
+    @cached_property
+    def kind(self) -> Integers:
+        """Kind of each shape; −1 of a joint limit."""
+        return np.append(self.system.shapes.kind, np.full(len(self.stops.body), -1))
+
+    @cached_property
+    def radius(self) -> Floats:
+        """Radius of each shape [m]; −1 of a joint limit."""
+        return np.append(self.system.shapes.radius, np.full(len(self.stops.body), -1.0))
+
+    @cached_property
+    def found(self) -> Contacts:
+        """The contacts between the closest features of each pair, near or far, and the joint
+        limits."""
         margin = math.inf
         if len(self.pairs) > MANY_PAIRS:
-            margin = max((size for size in sizes if size < math.inf), default=0.0)
+            extents = self.size[: len(self.system.shapes.kind)]
+            margin = float(extents[np.isfinite(extents)].max(initial=0.0))
         placed = self.mechanism.placements(self.q)
         stops = self.stops
-        found = system.finder.find(*placed, margin)
+        found = self.system.finder.find(*placed, margin)
         limits = Contacts(
             stops.shape,
             stops.shape,
@@ -154,6 +156,36 @@ class Start:
         )
         both: Any = zip(found, limits, strict=True)
         return Contacts(*(np.concatenate(columns) for columns in both))
+
+    @cached_property
+    def tree_a(self) -> Integers:
+        """Tree of the first body of each contact."""
+        return self.mechanism.tree_of_body[self.found.body_a]
+
+    @cached_property
+    def tree_b(self) -> Integers:
+        """Tree of the second body of each contact; at a wall that of the first."""
+        moving = np.where(self.found.body_b < 0, self.found.body_a, self.found.body_b)
+        return self.mechanism.tree_of_body[moving]
+
+    @cached_property
+    def rows(self) -> Floats:
+        """Jacobian rows (c, d) along the normals."""
+        rows = self.rows_along(np.arange(len(self.found.gap)), self.found.normal)
+        limits = np.arange(self.first_stop, len(rows))
+        rows[limits, self.stops.dof] = self.stops.arm * self.stops.sign
+        return rows
+
+    @cached_property
+    def friction(self) -> Floats:
+        """Coefficient of each contact."""
+        classes, table = self.system.frictions
+        return np.asarray(table[classes[self.found.shape_a], classes[self.found.shape_b]])
+
+    @cached_property
+    def thickness(self) -> Floats:
+        """Size of the thinner of two shapes in contact [m]."""
+        return np.minimum(self.size[self.found.shape_a], self.size[self.found.shape_b])
 
     def rows_along(self, contacts: Rows, directions: Floats) -> Floats:
         """Return the Jacobian rows (k, d) of contacts (k,) along directions (k, 3)."""
@@ -353,7 +385,7 @@ def step_limits(start: Start) -> StepLimits | None:
 def _limits_at(start: Start, mobility: float, rows: Rows, most: float) -> StepLimits:
     """Return the limits at contacts (c,) of a mobility [1/kg]: k + 2 b <= 4, and k <= `most`."""
     dt = start.dt
-    (K, B) = start.scene.contact.gains
+    K, B = start.scene.contact.gains
     stable = 4.0 * (1.0 + ROUNDED)
     k = K * mobility * dt**2
     b = B * mobility * dt
@@ -478,7 +510,7 @@ def _overlaps(start: Start) -> Iterator[Caution]:
     for rows in start.by_pair:
         i = int(rows[0])
         depth = -float(found.gap[i])
-        (a, b) = (start.labels[s] for s in (found.shape_a[i], found.shape_b[i]))
+        a, b = (start.labels[s] for s in (found.shape_a[i], found.shape_b[i]))
         if depth <= 0.0 or not _too_deep(start, rows, float(resting[rows].max())):
             continue
         if found.body_b[i] < 0:
@@ -542,7 +574,7 @@ def _too_deep(start: Start, rows: Rows, resting: float) -> bool:
 def _fast(start: Start) -> Iterator[Caution]:
     """Warn of bodies that move by more than half of a shape in the step of the impact."""
     for i in (int(rows[0]) for rows in start.by_pair):
-        (time, speed) = (float(x[i]) for x in start.meeting)
+        time, speed = (float(x[i]) for x in start.meeting)
         size = float(start.thickness[i])
         leaving = start.rows[i] @ start.v >= 0.0 and start.pull[i] >= 0.0
         if leaving or time > start.scene.duration or speed * start.dt <= 0.5 * size:
@@ -642,7 +674,7 @@ def _too_stiff(start: Start) -> Iterator[Caution]:
 def _sags(start: Start) -> Iterator[Caution]:
     """Warn of static loads that sag by more than a tenth: of a shape at a contact, of the range at
     a joint limit."""
-    (K, _) = start.scene.contact.gains
+    K, _ = start.scene.contact.gains
     stops = start.stops
     found = [(0.0, -1)]
     for rows in start.supports if K > 0.0 else ():

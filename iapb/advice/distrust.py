@@ -512,7 +512,7 @@ def _frames(run: Run, body: int, at: Integers) -> tuple[Floats, Floats]:
         turn[:, :2, :2] = np.stack([c, -s, s, c], axis=1).reshape(-1, 2, 2)
     elif body >= 0:
         origin = pose[:, :3]
-        (x, y, z, w) = pose[:, 3:].T
+        x, y, z, w = pose[:, 3:].T
         o = np.zeros(len(at))
         cross = np.stack([o, -z, y, z, o, -x, -y, x, o], axis=1).reshape(-1, 3, 3)
         turn = turn + 2.0 * (w[:, None, None] * cross + cross @ cross)

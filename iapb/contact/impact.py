@@ -314,8 +314,8 @@ def _resolve_one(
 ) -> Impact:
     """Resolve one impact; `rough`: tangents (c m, d), friction, and m."""
     M, J, v = arrays
-    (contacts, d) = J.shape
-    (budget, clamped, tolerance) = options
+    contacts, d = J.shape
+    budget, clamped, tolerance = options
     directions = rough[2] if rough else 0
     one = _batch_for_one(contacts, d, directions, unequal is not None)
     one.mass[...] = M

@@ -304,7 +304,7 @@ class Mechanism:
         the field g (3,)."""
         places, rates = self._states(qs, vs)
         field = finite_array("g", g, (3,), "m/s^2")
-        (kinetic, potential) = np.zeros((2, len(places)))
+        kinetic, potential = np.zeros((2, len(places)))
         _KERNELS.energies_along(
             self.block, self._scratch.workspace, places, rates, field, kinetic, potential
         )

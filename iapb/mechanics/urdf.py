@@ -206,7 +206,7 @@ def _with_plane(link: Link) -> list[Link]:
     if body.joint.kind != "planar" or body.joint.axis == (0.0, 0.0, 1.0):
         return [link]
     turn = _to_axis(body.joint.unit_axis)
-    (rotation, position) = body.placement
+    rotation, position = body.placement
     frame = Body(
         f"{body.name}_plane", body.parent, Joint("planar"), (product(rotation, turn), position)
     )

@@ -95,7 +95,7 @@ def joint_fault(scene: Scene) -> tuple[int, str, Any, str] | None:
     if all(_moves_its_own(body) for body in scene.bodies):
         return None
     mechanism = mechanism_of(scene)
-    (q, _) = start_of(scene)
+    q, _ = start_of(scene)
     k = mechanism.unmoved_velocity(q)
     if k is None:
         return None

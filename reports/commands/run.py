@@ -83,7 +83,7 @@ def run(
     chosen = find_world(world, rendering)
     law = chosen.law
     cautions = check_scene(source, law, chosen.coupling)
-    (said, _) = cost_in_words(source, law)
+    said, _ = cost_in_words(source, law)
     if said:
         to_stderr(f"{source.name} in {world}: {said}.")
     for caution in cautions:

@@ -184,7 +184,7 @@ ATTACKS = {  # by name: the attack, and what the refusal says
 @pytest.mark.parametrize("name", ATTACKS)
 def test_a_forged_run_is_refused_by_every_reader_and_shows_no_other_file(name, tmp_path):
     store = tmp_path / "store"
-    (attack, told) = ATTACKS[name]
+    attack, told = ATTACKS[name]
     store.mkdir()
     path = forged(store / "forged.h5", attack)
     write_run(store / "whole.h5", sample_run())

@@ -251,8 +251,8 @@ def damaged_values(sample, other, rng):
         places = list(places_of(plain))
         if not places:
             break
-        (owner, key) = chosen(rng, places)
-        (other, where) = chosen(rng, places)
+        owner, key = chosen(rng, places)
+        other, where = chosen(rng, places)
         value = owner[key]
         taken = copy.deepcopy(other[where])
         kind = int(rng.integers(7))

@@ -74,8 +74,8 @@ def following(shapes, shape, i):
 def vertices_half_plane(shapes, a, b, R, p, margin, buffer, count):
     """Write one contact per vertex of polygon a, or one for circle a: gap = (vertex - point)·normal
     - radius."""
-    (x0, y0) = corner(shapes, b, 0)
-    (nx, ny) = corner(shapes, b, 1)
+    x0, y0 = corner(shapes, b, 0)
+    nx, ny = corner(shapes, b, 1)
     radius = shapes.radius[a]
     frame = placement(shapes.body[a], R, p)
     # the normal in a's frame
@@ -118,8 +118,8 @@ def circle_polygon(shapes, circle, polygon, circle_is_a, R, p, margin, buffer, c
     nx = 0.0
     ny = 1.0
     for i in range(shapes.count[polygon]):
-        (ux, uy) = corner(shapes, polygon, i)
-        (wx, wy) = corner(shapes, polygon, following(shapes, polygon, i))
+        ux, uy = corner(shapes, polygon, i)
+        wx, wy = corner(shapes, polygon, following(shapes, polygon, i))
         ex = wx - ux
         ey = wy - uy
         length = hypotenuse(ex, ey)
@@ -132,8 +132,8 @@ def circle_polygon(shapes, circle, polygon, circle_is_a, R, p, margin, buffer, c
             if best - shapes.radius[circle] > margin:
                 return count
     feature = vertex_feature(1, 0, edge)
-    (ux, uy) = corner(shapes, polygon, edge)
-    (wx, wy) = corner(shapes, polygon, following(shapes, polygon, edge))
+    ux, uy = corner(shapes, polygon, edge)
+    wx, wy = corner(shapes, polygon, following(shapes, polygon, edge))
     ex = wx - ux
     ey = wy - uy
     before = (x - ux) * ex + (y - uy) * ey < 0.0
@@ -229,8 +229,8 @@ def best_edge(shapes, onto, other, R, p, margin):
 def edge_frame(shapes, shape, edge):
     """Return start (x, y), outward unit normal (x, y) and length of an edge, in the polygon's
     frame."""
-    (ux, uy) = corner(shapes, shape, edge)
-    (wx, wy) = corner(shapes, shape, following(shapes, shape, edge))
+    ux, uy = corner(shapes, shape, edge)
+    wx, wy = corner(shapes, shape, following(shapes, shape, edge))
     ex = wx - ux
     ey = wy - uy
     length = math.sqrt(ex * ex + ey * ey)

@@ -242,7 +242,7 @@ def _best_edges(apart, A, B):
 def _edge_middle(box, k, n):
     """Return the middle of the edge along axis k that lies farthest in direction n, and its feature
     number."""
-    (point, axes, half) = box
+    point, axes, half = box
     number = 0
     for other in range(3):
         if other != k:
@@ -293,8 +293,8 @@ def clip_faces(
 ):
     """Write the contacts over the reference face `face` of box `ref`; its outward normal m points
     to the other box."""
-    (center, axes, half) = box
-    (center_other, axes_other, half_other) = box_other
+    center, axes, half = box
+    center_other, axes_other, half_other = box_other
     apart = subtract(center_other, center)
     sign = 1.0 if dot(apart, axes[face]) >= 0.0 else -1.0
     u = axes[(face + 1) % 3]

@@ -146,7 +146,7 @@ def test_boxes_in_space_overlap_as_coal_says() -> None:
             [Shape(BOX, k, half_size=0.5 * size) for k, size in enumerate(sizes)], True
         )
         found = ContactFinder(shapes, candidate_pairs(shapes)).find(axes, origins)
-        (one, other) = (coal.Box(*size) for size in sizes)
+        one, other = (coal.Box(*size) for size in sizes)
         result = coal.CollisionResult()
         poses = [coal.Transform3s(axes[k], origins[k]) for k in range(2)]
         if not coal.collide(one, poses[0], other, poses[1], coal.CollisionRequest(), result):

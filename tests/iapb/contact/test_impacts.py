@@ -127,7 +127,7 @@ def test_an_impact_is_the_exact_one_in_every_unit(seed: int, clamp: bool, decade
         1.0, abs=1e-13
     )
     change = exact_change(M, v, found.velocity)
-    (low, high) = found.energy_interval
+    low, high = found.energy_interval
     assert Fraction(low) <= change <= Fraction(high) and low <= found.energy_change <= high
     assert abs(Fraction(found.energy_change) - change) <= Fraction(
         0.51 * math.ulp(found.energy_change)
@@ -151,7 +151,7 @@ def test_energy_is_enclosed_where_its_squares_leave_the_range(power: int, skew: 
         for e, clamp in ((1.0, False), (1.0, True), (0.3, True)):
             found = resolve_impact(M, J, v, e, clamp=clamp)
             change = exact_change(M, v, found.velocity)
-            (low, high) = found.energy_interval
+            low, high = found.energy_interval
             assert Fraction(low) <= change <= Fraction(high)
             assert change <= 0 or not clamp
             if e == 1.0 and power in (0, 300):  # as narrow as double-double sums of these products
@@ -165,7 +165,7 @@ def test_energy_is_enclosed_where_only_halves_of_its_products_overflow() -> None
     v = np.array([float.fromhex("-0x1.c386bbc204f8ap+511")])
     found = resolve_impact(M, np.eye(1), v, 0.0)
     change = exact_change(M, v, found.velocity)
-    (low, high) = found.energy_interval
+    low, high = found.energy_interval
     assert Fraction(low) <= change <= Fraction(high) < 0
     assert abs(Fraction(found.energy_change) - change) <= Fraction(math.ulp(found.energy_change))
 

@@ -571,8 +571,8 @@ class Step:
             ends = []
             angles = []
             for body in (ours, theirs):
-                (turn, origin) = placed(body, self.q)
-                (turned, moved) = placed(body, q)
+                turn, origin = placed(body, self.q)
+                turned, moved = placed(body, q)
                 ends.append(moved + turned @ turn.T @ (c.point - origin))
                 angles.append(Rotation.from_matrix(turned @ turn.T).as_rotvec())
             found = ends[0] - ends[1]

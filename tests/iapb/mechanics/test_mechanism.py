@@ -113,8 +113,8 @@ def test_jacobians_are_the_derivatives_of_positions(seed, joints):
         there, origin = mechanism.placements(mechanism.integrate(q, v, h))
         return origin[body] + there[body] @ local, there[body]
 
-    (after, turned) = place(STEP)
-    (before, unturned) = place(-STEP)
+    after, turned = place(STEP)
+    before, unturned = place(-STEP)
     point = positions[body] + rotations[body] @ local
     jacobian = mechanism.point_jacobian(q, body, point)
     np.testing.assert_allclose(jacobian @ v, (after - before) / (2 * STEP), atol=1e-6, rtol=1e-6)

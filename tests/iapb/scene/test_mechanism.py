@@ -57,7 +57,7 @@ def test_prismatic_axis_lies_in_the_plane_and_has_length_one() -> None:
         {"bodies.puck": {"name": "puck", "joint": "prismatic", "axis": [0, 5], "mass": 2}}
     )
     mechanism = mechanism_of(scene)
-    (q, _) = start_of(scene)
+    q, _ = start_of(scene)
     step = np.zeros(mechanism.nv)
     step[-1] = 0.25
     moved = mechanism.placements(mechanism.integrate(q, step, 1.0))[1] - mechanism.placements(q)[1]

@@ -35,7 +35,7 @@ def test_arm_touches_the_obstacle_across_the_rod_at_the_named_place(
 ) -> None:
     scene = load_scene(find_scene(name))
     mechanism = mechanism_of(scene)
-    (q, v) = start_of(scene)
+    q, v = start_of(scene)
     ((point, normal, gap),) = contacts_at(scene, q)
     assert gap == pytest.approx(-1e-9, abs=1e-13)
     np.testing.assert_allclose(normal, [1.0, 0.0, 0.0], atol=1e-12)
