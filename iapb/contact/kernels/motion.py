@@ -162,64 +162,80 @@ def swing(world, state, h):
     a = state.acceleration
     for t in range(free.kind.shape[0]):
         if free.kind[t] == LINKAGE:
-            start = world.tree_start[t]
-            stop = world.tree_stop[t]
-            p = state.root_momentum[t]
-            state.tree_energy[t] = base_momentum(
-                m, free, state.body, state.q, state.mass_matrix, start, stop, t, state.v, p
-            )
-            if free.base[t] > 0 and m.kind[free.root[t]] != SPHERICAL:
-                center, mass = center_of(m, state.body, world.tree_of_body, t)
-                path = scale(
-                    h / mass if mass > 0.0 else 0.0, linear_momentum(m, free, state.body, t, p)
-                )
-                p[6], p[7], p[8] = add(center, path)
+            note_momentum(world, state, t, h)
     for b in range(m.kind.shape[0]):
         if free.kind[world.tree_of_body[b]] == LINKAGE:
             start = m.v_start[b]
-            stop = m.v_start[b] + m.v_count[b]
+            stop = start + m.v_count[b]
             add_multiple(state.v[start:stop], 0.5 * h, a[start:stop])
             integrate_body(m, b, state.q, state.v, h, state.q)
             add_multiple(state.v[start:stop], 0.5 * h, a[start:stop])
     if not locate(world, state):
         return False
     for t in range(free.kind.shape[0]):
-        if free.base[t] > 0 and m.kind[free.root[t]] != SPHERICAL:
+        if moves_freely(world, t):
             p = state.root_momentum[t]
             center, _ = center_of(m, state.body, world.tree_of_body, t)
-            shift_root(
-                m,
-                free,
-                state.body,
-                world.tree_of_body,
-                state.q,
-                t,
-                subtract((p[6], p[7], p[8]), center),
-            )
+            missed = subtract((p[6], p[7], p[8]), center)
+            shift_root(m, free, state.body, world.tree_of_body, state.q, t, missed)
     copy_into(state.located_q, state.q)
     copy_into(state.body.placed_q[: state.q.shape[0]], state.q)
     copy_into(state.acceleration_before, a)
     coriolis(world, state)
     for t in range(free.kind.shape[0]):
         if free.kind[t] == LINKAGE:
-            start = world.tree_start[t]
-            stop = world.tree_stop[t]
-            for k in range(start, stop):
-                state.v[k] += 0.5 * h * (a[k] - state.acceleration_before[k])
-            p = state.root_momentum[t]
-            to_fixed_axes(m, free, state.body, state.q, t, p, -1.0)
-            keep_momentum_and_energy(
-                state.mass_matrix,
-                state.lower,
-                start,
-                stop,
-                free.base[t],
-                p,
-                state.tree_energy[t],
-                state.v,
-                state.bias,
-            )
+            end_swing(world, state, t, h)
     return True
+
+
+@kernel
+def moves_freely(world, t):
+    """Return whether the root of linkage t moves without a hold, so that its centre of mass moves
+    straight."""
+    free = world.free
+    return free.base[t] > 0 and world.mechanism.kind[free.root[t]] != SPHERICAL
+
+
+@kernel
+def note_momentum(world, state, t, h):
+    """Note the root's momentum and the energy of linkage t, and where its centre of mass will be
+    after h seconds."""
+    m = world.mechanism
+    free = world.free
+    start = world.tree_start[t]
+    stop = world.tree_stop[t]
+    p = state.root_momentum[t]
+    state.tree_energy[t] = base_momentum(
+        m, free, state.body, state.q, state.mass_matrix, start, stop, t, state.v, p
+    )
+    if moves_freely(world, t):
+        center, mass = center_of(m, state.body, world.tree_of_body, t)
+        momentum = linear_momentum(m, free, state.body, t, p)
+        path = scale(h / mass if mass > 0.0 else 0.0, momentum)
+        p[6], p[7], p[8] = add(center, path)
+
+
+@kernel
+def end_swing(world, state, t, h):
+    """Do the second half of the velocity's step of linkage t; keep momentum and energy."""
+    free = world.free
+    start = world.tree_start[t]
+    stop = world.tree_stop[t]
+    for k in range(start, stop):
+        state.v[k] += 0.5 * h * (state.acceleration[k] - state.acceleration_before[k])
+    p = state.root_momentum[t]
+    to_fixed_axes(world.mechanism, free, state.body, state.q, t, p, -1.0)
+    keep_momentum_and_energy(
+        state.mass_matrix,
+        state.lower,
+        start,
+        stop,
+        free.base[t],
+        p,
+        state.tree_energy[t],
+        state.v,
+        state.bias,
+    )
 
 
 @kernel
