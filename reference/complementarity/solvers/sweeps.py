@@ -92,16 +92,13 @@ def _on_cones(problem: ImpactProblem, sweeps: int = _SWEEPS) -> Answer:
     blocks = problem.delassus.reshape(k, size, k, size)[np.arange(k), :, np.arange(k)]
     inertia = np.linalg.norm(blocks, ord=2, axis=(1, 2))
     inertia[inertia == 0.0] = 1.0
-    p = np.zeros(problem.size)
-    done = _sweep_cones(
+    p, done = _sweep_cones(
         np.ascontiguousarray(problem.delassus),
         problem.offset,
         problem.friction_or_zero,
         inertia,
         problem.relaxed,
-        p,
-        np.zeros(size),
-        np.zeros(size),
+        size,
         sweeps,
         _STILL_ON_CONES * velocity_scale(problem),
     )
@@ -111,8 +108,11 @@ def _on_cones(problem: ImpactProblem, sweeps: int = _SWEEPS) -> Answer:
 
 
 @numba.njit(cache=True, fastmath=False)
-def _sweep_cones(w, b, mu, inertia, relaxed, p, u, trial, sweeps, still):  # type: ignore[no-untyped-def]
-    size = len(trial)
+def _sweep_cones(w, b, mu, inertia, relaxed, size, sweeps, still):  # type: ignore[no-untyped-def]
+    """Return the impulse, and the number of sweeps until it was still, -1: never."""
+    p = np.zeros(len(b))
+    u = np.zeros(size)
+    trial = np.zeros(size)
     for sweep in range(sweeps):
         largest = 0.0
         for k in range(len(mu)):
@@ -134,8 +134,8 @@ def _sweep_cones(w, b, mu, inertia, relaxed, p, u, trial, sweeps, still):  # typ
                     largest = max(largest, abs(trial[i] - p[first + i]) * inertia[k])
                     p[first + i] = trial[i]
         if largest <= still:
-            return sweep + 1
-    return -1
+            return p, sweep + 1
+    return p, -1
 
 
 @numba.njit(cache=True, fastmath=False)
