@@ -3,13 +3,13 @@ breaks the reader."""
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from ruamel.yaml import YAML
 
 from iapb.errors import ArgumentError, SceneError
 from iapb.scene import Scene, find_scene, load_scene, scene_from_text
@@ -51,167 +51,18 @@ walls:
 FULL = scene_from_text(PLANE)
 FULL_SPACE = scene_from_text(SPACE)
 
-NOT_A_NUMBER = ["x", None, True, [1], {}, math.nan, math.inf, 1e10]
-NOT_POSITIVE = [*NOT_A_NUMBER, 0.0, -1.0]
-NEGATIVE = [*NOT_A_NUMBER, -1e-9]
-OWN = [value for value in NEGATIVE if value is not None]  # None: not given
-NOT_A_VECTOR = [1.0, "x", None, [1.0], [1.0, 2.0, 3.0, 4.0], ["x", 0], [math.nan, 0.0]]
-NOT_A_NAME = ["", "a b", "a.b", "1a", "é", "a\n", 3, None, "x" * 65]
-NOT_A_PAIR_OF_GAINS = [[1], [1, 1, 1], [-1, 1], [1, "x"], 3, []]
-
-# path: values that are refused there; the mistake names the field
-IN_THE_PLANE: dict[str, list[Any]] = {
-    "name": [name for name in NOT_A_NAME if name != "a.b"],
-    "rate": [*NOT_POSITIVE, 1.1e6],
-    "duration": [*NOT_POSITIVE, 1e-4, 1e5],
-    "integrator": ["leapfrog"],
-    "gravity": [value for value in NOT_A_VECTOR if value is not None],
-    "bodies": [[], None, {}, "x", [3], [{"name": "b", "joint": "fixed"}]],
-    "bodies.puck.name": [*NOT_A_NAME, "arm", "world"],
-    "bodies.arm.parent": [*NOT_A_NAME, "puck", "arm", "nobody"],
-    "bodies.arm.joint": ["hinge", None, 3, "planar", "free_flyer"],
-    "bodies.arm.axis": [[1.0, 0.0]],
-    "bodies.arm.mass": NEGATIVE,
-    "bodies.puck.density": [value for value in NOT_POSITIVE if value is not None],
-    "bodies.slide.density": [1.0],  # no shapes
-    "bodies.arm.joint_damping": [*(x for x in NEGATIVE if x != [1]), [1.0, 1.0], [-1.0]],
-    "bodies.arm.joint_friction": [*(x for x in NEGATIVE if x != [1]), [1.0, 1.0], [-1.0]],
-    "bodies.arm.joint_mimic": [
-        3,
-        {},
-        {"body": "nobody"},
-        {"body": "arm"},
-        {"body": "base"},
-        {"body": "slide", "multiplier": "x"},
-        {"body": "slide", "offset": math.inf},
-        {"body": "slide", "factor": 2.0},
-    ],
-    "bodies.puck.joint_mimic": [{"body": "slide"}],
-    "bodies.puck.joint_damping": [1.0, [1.0, 1.0], [1.0, 1.0, -1.0]],
-    "bodies.arm.joint_limits": [
-        1.0,
-        [1.0],
-        [1.0, 2.0],
-        [1.0, -1.0],
-        [0.0, 0.0],
-        ["x", 1.0],
-        [-1.0, math.nan],
-    ],
-    "bodies.puck.joint_limits": [[-1.0, 1.0]],
-    "bodies.base.joint_limits": [[-1.0, 1.0]],
-    "bodies.arm.shapes": [None, 3, [3], [{"kind": "capsule"}], [{"kind": "half_plane"}], [{}]],
-    "bodies.arm.shapes.0.size": [[0.0, 1.0], [1.0, -1.0], [1.0], 1.0],
-    "bodies.base.position": [[0.0]],
-    "bodies.arm.position": [[0.0, 0.0], ["x"], 0.0, [math.nan]],
-    "bodies.puck.position": [[0.0], [0.0, 0.0, 0.0, 0.0]],
-    "bodies.puck.velocity": [[0.0], ["x", 0.0, 0.0]],
-    "walls": [None, 3, [3], [{"kind": "circle", "radius": 1}]],
-    "walls.post.name": [*NOT_A_NAME, "floor"],
-    "walls.floor.kind": ["plane", None, "box"],
-    "walls.wedge.vertices": [
-        3,
-        [[0, 0], [1, 0]],
-        [[0, 0], [1, 0], [2, 0]],
-        [[0, 0], [1, 0], [1, 0], [0, 1]],
-        [[0, 0, 0], [1, 0], [0, 1]],
-        [[0, 0], [2, 0], [2, 2], [1, 0.5]],
-        [[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]],
-        [[0, 0], [1, 1], [1, 0], [0, 1]],
-        [[math.cos(4 * math.pi * k / 5), math.sin(4 * math.pi * k / 5)] for k in range(5)],
-    ],  # a pentagram
-    "contact.forces": ["explicit", None],
-    "contact.stiffness": [value for value in OWN if value != 1e10] + [1.1e15],
-    "contact.damping": [value for value in OWN if value != 1e10] + [1.1e15],
-    "contact.penalty": ["soft", None, True],
-    "contact.restitution": [*NEGATIVE, 1.001],
-    "contact.self_collision_rows": ["both", None],
-    "contact.impact_time": ["now", None],
-    "hand.body": [*NOT_A_NAME, "nobody", "floor", "foot"],
-    "hand.force": [[1.0, 2.0], 3.0, None, [math.nan, 0.0, 0.0]],
-    "hand.force_table": [1.0, [1.0], [[0.0, 1.0]], [[0.0, 1.0, 1.0, "x"]], [[0.0] * 4, [0.0] * 4]],
-    "hand.force_function": [
-        "t",
-        ["t"],
-        [None, "t", "t"],
-        *(
-            [text, "0", "0"]
-            for text in (
-                "__import__('os').system('ls')",
-                "t.real",
-                "open(t)",
-                "t if t else 1",
-                "(",
-                "sin()",
-                "1/t",
-                "2**0.5",
-                "1e400",
-                "'1'",
-                "",
-                "[t]",
-                "u",
-                "9" * 1900,
-                "-" * 1900 + "1",
-            )
-        ),
-    ],
-    "device": [[], 3],
-    "device.force_limit": [*NOT_A_PAIR_OF_GAINS, [0, 1]],
-    "device.delay": [-1, 1001, 1.0, "1", None, True],
-    **{
-        path: values
-        for values, paths in (
-            (
-                NOT_POSITIVE,
-                "bodies.puck.shapes.0.radius contact.friction_velocity",
-            ),
-            (
-                NEGATIVE,
-                "bodies.slide.mass bodies.puck.mass bodies.puck.inertia "
-                "bodies.arm.inertia contact.friction contact.approach_velocity "
-                "contact.cluster_distance "
-                "contact.coherence_distance",
-            ),
-            (NOT_A_NUMBER, "bodies.arm.angle bodies.arm.shapes.0.angle"),
-            (
-                NOT_A_VECTOR,
-                "bodies.arm.origin bodies.arm.shapes.0.center walls.floor.point hand.point "
-                "bodies.arm.center_of_mass",
-            ),
-            (OWN, "bodies.arm.friction walls.floor.friction"),
-            ([*OWN, 1.001], "bodies.arm.restitution walls.floor.restitution"),
-            (
-                NOT_A_PAIR_OF_GAINS,
-                "device.position_resolution device.damping couplings.four_channel.stiffness "
-                "couplings.four_channel.damping couplings.unilateral.stiffness "
-                "couplings.unilateral.damping",
-            ),
-            ([1, "true", None], "contact.self_collisions"),
-            ([3, None, "x" * 2001], "title source"),
-            (
-                [*NOT_A_VECTOR, [0.0, 0.0]],
-                "bodies.slide.axis walls.floor.normal",
-            ),
-        )
-        for path in paths.split()
-    },
+REFUSED = YAML(typ="safe").load(Path(__file__).with_name("refused.yaml"))
+LONG = {
+    "title": ["x" * 2001],
+    "source": ["x" * 2001],
+    "hand.force_function": [["9" * 1900, "0", "0"], ["-" * 1900 + "1", "0", "0"]],
 }
-IN_SPACE: dict[str, list[Any]] = {
-    "dimensions": [2, None],
-    "gravity": [[0.0, 1.0]],
-    "bodies.thing.joint": ["hinge"],
-    "bodies.thing.mass": [-1.0],
-    "bodies.thing.position": [[0, 0, 0], [0, 0, 0, 0, 0, 1, 1]],
-    "bodies.thing.inertia": [
-        [[1, 0.1, 0], [0.2, 2, 0], [0, 0, 3]],
-        1.0,
-    ],
-    "bodies.wheel.axis": [None, [0, 0], [0, 0, 0]],
-    "bodies.wheel.position": [[1, 1]],
-    "walls.floor.normal": [[0, 1], [0, 0, 0]],
-}
-TABLE = [(FULL, *row) for row in IN_THE_PLANE.items()] + [
-    (FULL_SPACE, *row) for row in IN_SPACE.items()
+TABLE = [
+    (scene, path, sum(values, []))
+    for scene, space in ((FULL, "plane"), (FULL_SPACE, "space"))
+    for path, values in REFUSED[space].items()
 ]
+TABLE += [(FULL, path, values) for path, values in LONG.items()]
 
 
 @pytest.mark.parametrize(("scene", "path", "values"), TABLE, ids=[row[1] for row in TABLE])
@@ -239,7 +90,7 @@ def field_names(part: Any) -> set[str]:
 
 
 def test_no_field_is_left_out_above() -> None:
-    tried = {path.split(".")[-1] for path in IN_THE_PLANE}
+    tried = {path.split(".")[-1] for path in REFUSED["plane"]}
     assert field_names(FULL.resolved()) - tried == {
         "contact",
         "hand",
@@ -249,42 +100,9 @@ def test_no_field_is_left_out_above() -> None:
     }
 
 
-# (text that is replaced, its replacement, field of the mistake, its line); in the plane unless the
-# text is of SPACE
 WRITTEN = [
-    ("rate: 1000", "rate: fast", "rate", 2),
-    ("rate: 1000", "rate: 1\nrate: 2", "rate", 3),
-    ("duration: 1\n", "", "duration", 1),
-    ("joint: fixed", "joint: fixd", "bodies[0].joint", 6),
-    ("axis: [2, 0], ", "", "bodies[1].axis", 7),
-    ("size: [1, 2]", "size: [1, 2], colour: red", "bodies[2].shapes[0].colour", 8),
-    ("radius: 0.1}]}\n", "}]}\n", "bodies[3].shapes[0].radius", 9),
-    ("joint: planar, mass: 1", "joint: planar, density: 3, mass: 1", "bodies[3].density", 9),
-    ("kind: half_plane", "kind: halfplane", "walls[0].kind", 12),
-    ("normal: [0, 1]", "normal: [0, 0]", "walls[0].normal", 12),
-    ("friction: 0.2", "fricton: 0.2", "contact.fricton", 15),
-    *(
-        ("friction: 0.2", f"friction: {word}", "contact.friction", 15)
-        for word in (
-            ".nan",
-            ".inf",
-            "1e999",
-            "yes",
-            "0x10",
-            "1_000",
-            "'1'",
-            "true",
-            "null",
-            "[1]",
-            "9" * 5000,
-        )
-    ),
-    ("body: arm", "body: am", "hand.body", 16),
-    ("hand: {body: arm}\n", "", "device", 16),
-    ("damping: [0, 0]", "damping: [0]", "device.damping", 17),
-    ("dimensions: 3\n", "", "bodies[0].joint", 6),
-    ("dimensions: 3\n", "", "dimensions", 1),
-    ("inertia: [1, 2, 3]", "inertia: 1", "bodies[0].inertia", 7),
+    *REFUSED["written"],
+    ["friction: 0.2", f"friction: {'9' * 5000}", "contact.friction", 15],
 ]
 
 
