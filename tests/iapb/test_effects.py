@@ -3,10 +3,12 @@ caller's choices."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from ruamel.yaml import YAML
 
 from iapb.contact.laws import ImpulseAugmented, Penalty
 from iapb.effects import COUPLING_FIELDS, EFFECTS, Effect, decide_effects
@@ -15,109 +17,8 @@ from iapb.scene import Scene, find_scene, load_scene, scene_names
 from reference.time_stepping import RigidConstraints
 
 PEG = load_scene(find_scene("peg_corner"))
-ARM = load_scene(find_scene("arm_pushing"))
 PENDULUM = load_scene(find_scene("double_pendulum"))
-DISCS = load_scene(find_scene("two_discs"))
-CHAIN = {
-    "bodies": [
-        {
-            "name": name,
-            "parent": parent,
-            "joint": "revolute",
-            "inertia": 1,
-            "origin": [3 * (parent != "world"), 0],
-            "shapes": [{"kind": "circle", "radius": 1}],
-        }
-        for name, parent in (("one", "world"), ("two", "one"), ("three", "two"))
-    ],
-    "hand": None,
-    "device": None,
-    "couplings": {},
-    "contact.self_collisions": True,
-}
-ONE_LINK = {
-    "bodies": [{"name": "upper", "joint": "revolute", "mass": 1, "center_of_mass": [0.25, 0]}]
-}
-NO_SHAPES = {"bodies.peg.shapes": []}
-
-SWITCHES: dict[str, tuple[Scene, dict[str, Any], dict[str, Any], str]] = {
-    "gravity": (PENDULUM, {}, {"gravity": None}, "-9.81"),
-    "varying_inertia": (PENDULUM, {}, ONE_LINK, "upper, lower"),
-    "velocity_terms": (PENDULUM, {}, ONE_LINK, "upper, lower"),
-    "hand_force": (PEG, {}, {"hand.force": [0, 0, 0]}, "[-0.32, 0.4, 0]"),
-    "joint_damping": (
-        PENDULUM,
-        {"bodies.upper.joint_damping": 0.25},
-        {"bodies.upper.joint_damping": 0.0},
-        "upper [0.25]",
-    ),
-    "joint_friction": (
-        PENDULUM,
-        {"bodies.upper.joint_friction": 0.25},
-        {"bodies.upper.joint_friction": 0.0},
-        "upper [0.25] N, N m",
-    ),
-    "joint_limits": (PENDULUM, {"bodies.lower.joint_limits": [-3, 3]}, {}, "lower [-3, 3] rad, m"),
-    "wall_contacts": (PEG, {}, {"walls": []}, "2 pairs"),
-    "body_contacts": (DISCS, {}, {"bodies.striker.shapes": []}, "1 pair"),
-    "self_collisions": (PEG, CHAIN, {**CHAIN, "contact.self_collisions": False}, "1 pair"),
-    "impulses": (PEG, {"contact.restitution": 0.25}, NO_SHAPES, "0.25"),
-    "unequal_restitution": (
-        PEG,
-        {f"walls.{PEG.walls[0].name}.restitution": 0.75},
-        {"bodies.peg.restitution": 0.75},
-        "to 0.75",
-    ),
-    "impact_friction": (
-        PEG,
-        {"contact.friction": 0.3},
-        {"contact.friction": 0},
-        "contact.friction = 0.3",
-    ),
-    "penalty_stiffness": (PEG, {"contact.stiffness": 1234}, {"contact.stiffness": 0}, "1234 N/m"),
-    "contact_damping": (PEG, {"contact.damping": 56}, {"contact.damping": 0}, "56 N s/m"),
-    "friction": (PEG, {"contact.friction": 0.3}, {"contact.friction": 0}, "contact.friction = 0.3"),
-    "implicit_contact": (
-        PEG,
-        {"contact.forces": "implicit"},
-        {"contact.forces": "paper"},
-        "= implicit",
-    ),
-    "touch": (
-        PEG,
-        {"contact.forces": "implicit"},
-        {"contact.forces": "implicit", "contact.impact_time": "step"},
-        "= touch",
-    ),
-    "supports": (
-        PEG,
-        {"contact.forces": "implicit"},
-        {"contact.forces": "implicit", **NO_SHAPES},
-        "contacts",
-    ),
-    "clustering": (
-        PEG,
-        {"contact.cluster_distance": 0.002},
-        {"contact.cluster_distance": 0},
-        "0.002 m",
-    ),
-    "coherence": (
-        PEG,
-        {"contact.coherence_distance": 0.003},
-        {"contact.coherence_distance": 0},
-        "0.003 m",
-    ),
-    "coupling": (PEG, {}, {"couplings": {}}, "[100, 100, 0.5]"),
-    "device_limits": (PEG, {}, {"device": None}, "[15, 15, 1]"),
-    "delay": (PEG, {"device.delay": 4}, {"device.delay": 0}, "4 steps, 7.8125 ms"),
-    "quantisation": (PEG, {"device.position_resolution": [1e-5, 1e-5, 0]}, {}, "[1e-05, 1e-05, 0]"),
-    "device_damping": (
-        PEG,
-        {"device.damping": [0.5, 0.5, 0]},
-        {"device.damping": [0, 0, 0]},
-        "[0.5, 0.5, 0]",
-    ),
-}
+SWITCHES = YAML(typ="safe").load(Path(__file__).with_name("switches.yaml"))
 
 
 def effect(scene: Scene, name: str, *choices: Any) -> Effect:
@@ -130,11 +31,12 @@ def test_every_effect_is_switched_above() -> None:
 
 @pytest.mark.parametrize("name", SWITCHES)
 def test_a_scene_alone_switches_the_effect_and_the_reason_has_its_values(name: str) -> None:
-    scene, on, off, values = SWITCHES[name]
-    switched_on = effect(scene.with_values(on), name)
-    switched_off = effect(scene.with_values(off), name)
+    given = SWITCHES[name]
+    scene = load_scene(find_scene(given["scene"]))
+    switched_on = effect(scene.with_values(given["on"]), name)
+    switched_off = effect(scene.with_values(given["off"]), name)
     assert switched_on.active and not switched_off.active and switched_on.left_out
-    assert values in switched_on.reason and switched_off.reason != switched_on.reason
+    assert given["said"] in switched_on.reason and switched_off.reason != switched_on.reason
 
 
 RIGID = RigidConstraints()
