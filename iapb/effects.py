@@ -140,9 +140,8 @@ class Rule(NamedTuple):
     left_out: str | Reason  # what would change without it
     off: Reason = lambda q: ""  # why the scene's values switch it off; empty if they do not
     parts: tuple[str, ...] = ()  # of the contact section
-    absent: Reason | None = (
-        None  # why there is nothing to act on; default: nothing can touch, if there are `parts`
-    )
+    # why there is nothing to act on; default: nothing can touch, if there are `parts`
+    absent: Reason | None = None
     ignores: str = ""  # field to report if only the law switches it off, and uses none of `parts`
 
     def decide(self, name: str, q: Question) -> Effect:

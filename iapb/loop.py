@@ -79,9 +79,8 @@ def write_step(record, k, step, state, port):
     line = record.steps
     for i in range(state.q.shape[0]):
         line.q[k, i] = state.q[i]
-    for i in range(
-        state.v.shape[0]
-    ):  # one loop: eight short ones would cost more than what they copy
+    # one loop: eight short ones would cost more than what they copy
+    for i in range(state.v.shape[0]):
         line.v[k, i] = state.v[i]
         line.hand_force[k, i] = port.hand_force[i]
         line.coupling_force[k, i] = port.coupling_force[i]

@@ -20,15 +20,13 @@ from iapb.scene.model import SpatialScene
 from iapb.system import System
 from iapb.thinning import Thinned
 
-_CONTACT_ROWS_PER_CHUNK = (
-    200_000  # bounds the memory of a chunk in scenes with many contacts (about 30 MB)
-)
+# bounds the memory of a chunk in scenes with many contacts (about 30 MB)
+_CONTACT_ROWS_PER_CHUNK = 200_000
 _ROOM = 30e6  # bytes of a record, unless one chunk is larger
 _PIECE = 16e6  # bytes of the steps that are held before they are thinned
 _BATCH = 50_000_000  # bytes of mass matrices held at once
-_STEPS_PER_CHUNK = (
-    PLANNED  # one second of the paper's loop: progress and Ctrl-C work at least that often
-)
+# one second of the paper's loop: progress and Ctrl-C work at least that often
+_STEPS_PER_CHUNK = PLANNED
 
 _KEPT_WHEN_CARRIED = (
     "kinetic",
@@ -76,9 +74,8 @@ class Recorder:
         self.steps = 0  # number of all steps done
         self._thinned = Thinned(every) if every > 1 else None
         self._before: dict[str, float] = {}  # the energies at `first`
-        self._at_first: tuple[dict[str, Floats], dict[str, float]] | None = (
-            None  # state and energy of the whole run
-        )
+        # state and energy of the whole run
+        self._at_first: tuple[dict[str, Floats], dict[str, float]] | None = None
 
     @property
     def bytes_per_step(self) -> int:

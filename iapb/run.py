@@ -27,9 +27,8 @@ from iapb.numerics.schema import Booleans, Floats, Integers, Quantity, States, q
 FREE = 0
 COLLIDING = 1
 RESTING = 2
-UNSOLVED = (
-    "resting contact was not solved to rounding, and velocities were shortened"  # begins a remark
-)
+# begins a remark
+UNSOLVED = "resting contact was not solved to rounding, and velocities were shortened"
 STATE_NAMES = ("free", "colliding", "resting")
 INTERRUPTED = "interrupted"  # value of `Run.stopped` after Ctrl-C
 _SHOWN = 12  # most coordinates that a plot or a table shows

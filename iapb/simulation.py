@@ -100,9 +100,8 @@ class Simulation:
         if isinstance(self.law, ImpulseAugmented | Penalty):
             self.law = self.law.within(self.scene)
         self.state = self.system.make_state()
-        self.compiled = (
-            getattr(type(self.law), "advance", None) is Penalty.advance
-        )  # else a subclass overrides it
+        # else a subclass overrides it
+        self.compiled = getattr(type(self.law), "advance", None) is Penalty.advance
         self.effects = self.system.decide(self.law, self.coupling)
         self.world = self.system.world_under(
             *(self.law, self.effects) if self.compiled else (Penalty(),)

@@ -33,16 +33,13 @@ from reference import Floats
 from reference.complementarity.problem import ImpactProblem
 from reference.hdf5 import Budget, dataset_at, group_at, values_at
 
-LARGEST_SIZE = (
-    10_000  # unknowns: a dense W of 0.8 GB; a header with a larger number counts as damaged
-)
-LARGEST_MATRIX = (
-    1_000_000  # rows or columns of a sparse matrix, whose memory depends on its entries only
-)
+# unknowns: a dense W of 0.8 GB; a header with a larger number counts as damaged
+LARGEST_SIZE = 10_000
+# rows or columns of a sparse matrix, whose memory depends on its entries only
+LARGEST_MATRIX = 1_000_000
 WITH_MECHANICS = 2_000  # coordinates up to which a global problem keeps its dense M and J
-_LARGEST_TEXT = (
-    64 << 20
-)  # unpacked bytes, enough for 2,500 unknowns; a small gzip file can unpack to any size
+# unpacked bytes, enough for 2,500 unknowns; a small gzip file can unpack to any size
+_LARGEST_TEXT = 64 << 20
 _BLOCK = 256  # columns of M⁻¹ H at a time: 25 MB for 12,000 coordinates
 # nz of compressed columns and compressed rows; nz >= 0 counts triplets
 _COLUMNS = -1
@@ -170,9 +167,8 @@ def _fclib(path: Path, allowed: int | None) -> StoredProblem:
             problem = ImpactProblem.from_delassus(w, _numbers(budget, group, "vectors/q"), **given)
         solved = "solution" in list(file) and "r" in list(group_at(file, "solution"))
         r = _numbers(budget, file, "solution/r") if solved else np.zeros(0)
-        stored = (
-            r if r.any() and len(r) == problem.size else None
-        )  # zeros are a placeholder, not a solution
+        # zeros are a placeholder, not a solution
+        stored = r if r.any() and len(r) == problem.size else None
         return StoredProblem(problem, stored)
 
 
@@ -228,9 +224,8 @@ def _matrix(budget: Budget, group: Any, most: int) -> Any:
         compressed.check_format(
             full_check=True
         )  # an index out of range would write outside the array
-        if np.any(
-            compressed.indptr[1:] < compressed.indptr[:-1]
-        ):  # not seen by it where the last pointer is 0
+        # not seen by it where the last pointer is 0
+        if np.any(compressed.indptr[1:] < compressed.indptr[:-1]):
             raise ValueError(f"{group.name}: the pointers p decrease")
         return compressed.tocsc()
     if not 0 <= nz <= len(x):

@@ -181,9 +181,8 @@ def _check_size(dataset: Any, budget: Budget) -> None:
     if dataset.nbytes > _UNPACKED_SMALL + _MOST_PACKED * stored:
         raise ValueError(f"{name} states {dataset.size} values, more than its bytes can hold")
     largest = max(prod(dataset.shape[1:]), prod(dataset.chunks or (0,))) * width
-    if (
-        dataset.compression and _MOST_PACKED * stored > budget.allowed
-    ):  # a chunk may unpack to more than it states
+    # a chunk may unpack to more than it states
+    if dataset.compression and _MOST_PACKED * stored > budget.allowed:
         sizes: list[int] = []
         dataset.id.chunk_iter(lambda chunk: sizes.append(chunk.size))
         largest = max(largest, _MOST_PACKED * max(sizes, default=0))

@@ -69,9 +69,8 @@ class PinocchioMechanism:
         self._follows = bool(at)
         self.nq = len(self._own)
         self.nv = self._spread.shape[1]
-        body = (
-            self.pin.FrameType.BODY
-        )  # frames of the bodies, in the mechanism's order; the first frame is the world
+        # frames of the bodies, in the mechanism's order; the first frame is the world
+        body = self.pin.FrameType.BODY
         self._bodies = [k for k, frame in enumerate(model.frames) if k and frame.type == body]
         self._places = {model.frames[k].name: place for place, k in enumerate(self._bodies)}
 
@@ -294,9 +293,8 @@ def model_of(mechanism: Mechanism) -> PinocchioMechanism:
         before = still
         kind = body.joint.kind
         axis = body.joint.unit_axis
-        if (
-            kind == "continuous"
-        ):  # Pinocchio's unbounded joint always rotates about z: turn z to the axis, and back
+        # Pinocchio's unbounded joint always rotates about z: turn z to the axis, and back
+        if kind == "continuous":
             x = np.cross(np.eye(3)[np.argmin(np.abs(axis))], axis)
             x /= np.linalg.norm(x)
             before = pinocchio.SE3(np.column_stack((x, np.cross(axis, x), axis)), np.zeros(3))

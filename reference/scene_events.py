@@ -75,9 +75,8 @@ BOUNCE = 1e-7
 # of `released`: threshold right after an event, lower so that a contact that let go does not last
 # again
 _KEPT = 0.1
-_DEPENDENT = (
-    1e-9  # singular value, relative to the largest, below which held rows depend on one another
-)
+# singular value, relative to the largest, below which held rows depend on one another
+_DEPENDENT = 1e-9
 # Largest time [s] and largest path [m, rad] of the fourth-order differences for J̇v: rounding and
 # truncation are both near 1e-12, of |v|² where that is large.
 _DIFFERENCE = 1e-4
@@ -473,9 +472,8 @@ def _until_event(motion: _Motion, state: Floats, now: float) -> Any:
         found[-1].direction = direction
     accuracy = motion.tolerances.accuracy
     longest = motion.duration / motion.tolerances.steps
-    if (
-        motion.leaving
-    ):  # no step may skip a whole bounce: after a quarter of its time it has 3/4 of its height
+    # no step may skip a whole bounce: after a quarter of its time it has 3/4 of its height
+    if motion.leaving:
         longest = min(longest, 0.25 * motion.flight)
     solution = solve_ivp(
         motion.rate,

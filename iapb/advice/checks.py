@@ -314,9 +314,8 @@ class Start:
         for rows in self.by_pair:
             i = int(rows[0])
             tree = int(self.tree_a[rows[0]])
-            free = (
-                np.count_nonzero(self.mechanism.tree_of_body == tree) == 1
-            )  # a linkage would change its pose
+            # a linkage would change its pose
+            free = np.count_nonzero(self.mechanism.tree_of_body == tree) == 1
             flat = len(rows) > 1 or self.radius[self.found.shape_a[i]] > 0.0  # not on one corner
             if tree not in touched and free and flat and self.pull[i] < 0.0:
                 falls[tree] = min(

@@ -392,9 +392,8 @@ def _sank(seen: _Seen) -> Iterator[str]:
     most = DEEP * thinner
     for wall in (solid for solid in seen.solids.values() if solid.body < 0):
         rows = np.flatnonzero((table.body_b < 0) & (table.gap < -wall.thin))
-        ends = (
-            table.point[rows] - 0.5 * table.gap[rows, None] * table.normal[rows]
-        )  # on the surface of their wall
+        # on the surface of their wall
+        ends = table.point[rows] - 0.5 * table.gap[rows, None] * table.normal[rows]
         rows = rows[np.abs(wall.height(ends)) < -NEAR * table.gap[rows]]
         thinner[rows] = np.minimum(thinner[rows], wall.thin)
         most[rows] = np.minimum(most[rows], wall.thin)
@@ -526,16 +525,14 @@ def _squeezed(seen: _Seen) -> Iterator[str]:
     table = seen.run.contacts
     for b, size in enumerate(seen.sizes[:-1].tolist()):
         rows = np.flatnonzero((table.body_a == b) & (table.body_b < 0) & (table.gap < 0.0))
-        if not (
-            table.gap[rows] < -0.5 * NARROW * size
-        ).any():  # of two opposed contacts one has half of the overlap
+        # of two opposed contacts one has half of the overlap
+        if not (table.gap[rows] < -0.5 * NARROW * size).any():
             continue
         step = np.searchsorted(table.offsets, rows, "right") - 1
         caught = [np.zeros(0, np.int64)]
         widest = 0.0
-        for apart in range(
-            1, int(np.bincount(step - step[0]).max())
-        ):  # the contacts of a step are consecutive
+        # the contacts of a step are consecutive
+        for apart in range(1, int(np.bincount(step - step[0]).max())):
             one = rows[:-apart]
             other = rows[apart:]
             narrow = -(table.gap[one] + table.gap[other])

@@ -97,9 +97,8 @@ def measure(world, port):
     delayed."""
     slots = port.delayed_q.shape[0]
     now = port.clock[0] % slots
-    arriving = (
-        (port.clock[0] + 1) % slots if port.clock[0] + 1 >= slots else 0
-    )  # nothing older than the start
+    # nothing older than the start
+    arriving = (port.clock[0] + 1) % slots if port.clock[0] + 1 >= slots else 0
     if port.quantised:
         sense(world, port, port.delayed_v[now])
     else:
@@ -168,9 +167,8 @@ def couple(world, state, port):
     for k in range(port.applied.shape[0]):
         port.applied[k] = port.hand_force[k] + port.coupling_force[k]
     if port.coupling == UNILATERAL and port.engaged[0]:
-        for k in range(
-            port.v_start, port.v_stop
-        ):  # the hand reaches a coupled tool through the coupler only
+        # the hand reaches a coupled tool through the coupler only
+        for k in range(port.v_start, port.v_stop):
             port.applied[k] = port.coupling_force[k]
 
 

@@ -22,9 +22,8 @@ _FIFTH = (0.008333333333333333, 1.1564823173178714e-19)
 _SIXTH = (0.001388888888888889, -5.300543954373577e-20)
 _SEVENTH = (0.0001984126984126984, 1.7209558293420705e-22)
 
-_LARGEST_ANGLE = (
-    2.0**30
-)  # beyond this, doubles are 1e-7 rad apart, and the angle is first reduced by the rounded 2π
+# beyond this, doubles are 1e-7 rad apart, and the angle is first reduced by the rounded 2π
+_LARGEST_ANGLE = 2.0**30
 _TAN_22_5_DEGREES_TERMS = 10  # of the arc tangent's series below tan(22.5°): 4e-10
 
 

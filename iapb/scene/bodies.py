@@ -47,9 +47,8 @@ ORIGIN = (0.0, 0.0, 0.0)
 MAX_SHAPES_OF_BODY = 64
 MAX_VERTICES = 256  # use a circle for more
 UNIT_TOLERANCE = 1e-6  # error of a written quaternion's length: six digits are enough
-_STRAIGHT = (
-    1e-9  # sine of the smallest turn at a corner; below it, rounding errors would decide convexity
-)
+# sine of the smallest turn at a corner; below it, rounding errors would decide convexity
+_STRAIGHT = 1e-9
 
 V = TypeVar("V")  # Vector2 or Vector3
 Center = Annotated[V, Field(description="its centre [m], in body axes (walls: world axes)")]

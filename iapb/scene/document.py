@@ -19,9 +19,8 @@ from iapb.scene.parts import Path, written
 
 MAX_CHARACTERS = 1_000_000
 MAX_DEPTH = 24  # the deepest valid value, a vertex of a body's shape, has depth 7
-MAX_NODES = (
-    100_000  # values and field names after expansion of aliases, which could make a small file huge
-)
+# values and field names after expansion of aliases, which could make a small file huge
+MAX_NODES = 100_000
 _INTEGER = re.compile(r"[-+]?[0-9]{1,18}")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _WORDS: dict[str, Any] = {

@@ -520,9 +520,8 @@ def _across_parts(given: Any) -> Mistakes:
         if parent not in (None, WORLD) and parent not in names[:i]:
             order = "listed before it" if parent in names else "of this scene"
             yield ("bodies", i, "parent"), parent, f"world, or the name of a body {order}"
-        if (
-            i and roots[i] not in (None, roots[i - 1]) and roots[i] in roots[:i]
-        ):  # M would not be block diagonal
+        # M would not be block diagonal
+        if i and roots[i] not in (None, roots[i - 1]) and roots[i] in roots[:i]:
             yield ("bodies", i), names[i], f"its place among the other bodies of {roots[i]}'s tree"
     if bodies and all(body.get("joint") == "fixed" for body in bodies):
         yield ("bodies", 0, "joint"), "fixed", "at least one body of the scene that can move"

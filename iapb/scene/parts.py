@@ -20,9 +20,8 @@ from pydantic_core import InitErrorDetails, PydanticCustomError
 from iapb.errors import Mistake, shown
 from iapb.names import nearest
 
-LARGEST_NUMBER = (
-    1e9  # SI units; products of four such numbers are far below the double overflow limit
-)
+# SI units; products of four such numbers are far below the double overflow limit
+LARGEST_NUMBER = 1e9
 STIFFEST = 1e15  # [N/m, N s/m] of contacts: heavier loads than any scene's sag by less than 0.1 mm
 # the inertia of a grain; positive values may be divisors: their square must not underflow
 SMALLEST_POSITIVE = 1e-18

@@ -153,9 +153,8 @@ def bodies_of(robot: Robot, folder: Path, added: Added, number: int) -> list[dic
     path = Path(robot.urdf)
     root = folder.resolve()
     leads_out = "\0" in robot.urdf or path.is_absolute() or ".." in path.parts
-    if leads_out or not (root / path).resolve().is_relative_to(
-        root
-    ):  # after following symbolic links
+    # after following symbolic links
+    if leads_out or not (root / path).resolve().is_relative_to(root):
         raise ArgumentError("urdf", robot.urdf, "a relative path inside the scene's folder")
     links, remarks = read_robot(root / path, robot.floating, robot.leave_out)
     names = sorted(link.body.name for link in links)

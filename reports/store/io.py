@@ -104,9 +104,8 @@ def written_aside(target: Path, *, replace: bool, synced: bool = True) -> Iterat
             aside.unlink(missing_ok=True)
     except (OSError, RuntimeError) as error:
         named = Path(getattr(error, "filename", None) or target)
-        if (
-            named not in target.parents and named.parent != target.parent
-        ):  # of another file, read meanwhile
+        # of another file, read meanwhile
+        if named not in target.parents and named.parent != target.parent:
             raise
         number = re.search(
             r"errno = (\d+)", str(error)

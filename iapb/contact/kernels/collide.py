@@ -102,9 +102,8 @@ def largest_share(impulse, dofs, size, dt, force_limit):
         if share * force > limit:
             share = limit / force
     for i in range(size):
-        while (
-            share * abs(impulse[i]) / dt > force_limit[dofs[i]]
-        ):  # the division rounded up: one step back
+        # the division rounded up: one step back
+        while share * abs(impulse[i]) / dt > force_limit[dofs[i]]:
             share = np.nextafter(share, 0.0)
     return share
 
@@ -327,9 +326,8 @@ def resolve_island(world, state, island):
     if applied < share:
         clamp *= applied / share
     for r in range(count):
-        if (
-            r == 0 or state.rows[r] != state.rows[r - 1]
-        ):  # of two per-body rows the first is the one on body a
+        # of two per-body rows the first is the one on body a
+        if r == 0 or state.rows[r] != state.rows[r - 1]:
             i = state.rows[r]
             impulse = applied * state.row_impulse[r]
             before = state.contact_impulse[i]

@@ -32,9 +32,8 @@ def find_contacts(world, state):
     """
     now = state.contacts
     before = state.previous
-    for i in range(
-        state.contact_count[0]
-    ):  # `mark_new` and friction compare with those of the last step
+    # `mark_new` and friction compare with those of the last step
+    for i in range(state.contact_count[0]):
         copy_contact(before, i, now, i)
         before.normal_force[i] = now.normal_force[i]
         before.expected[i] = now.expected[i]

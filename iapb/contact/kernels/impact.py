@@ -26,9 +26,8 @@ from iapb.numerics.schema import Booleans, Floats
 # violate restitution at real contacts (the kit requires 1e-8); a smaller one would treat rounding
 # of a Jacobian (1e-16, amplified by √κ(M)) as a contact.
 RANK_TOLERANCE = 1e-10
-_NOISE_FACTOR = (
-    8.0  # rounding of a whitened row is below d · ε · κ(L) in all families tried; 8 is its margin
-)
+# rounding of a whitened row is below d · ε · κ(L) in all families tried; 8 is its margin
+_NOISE_FACTOR = 8.0
 
 
 class ImpactWork(NamedTuple):

@@ -78,9 +78,8 @@ def add_impact_friction(d, count, rank, work, push, f, only_push, impulses):
     change = work.change[:d]
     moved = f.moved[:d]
     largest = 0.0
-    for j in range(
-        p.shape[0]
-    ):  # whiten the tangents' rows, and remove the span of the normal rows: B and A_t Qᵀ
+    # whiten the tangents' rows, and remove the span of the normal rows: B and A_t Qᵀ
+    for j in range(p.shape[0]):
         row = f.rows[j, :d]
         slip = 0.0
         whiten_row(row, work)
@@ -220,9 +219,8 @@ def settle_friction(count, rank, work, push, f, d, scale, only_push, impulses):
     for i in range(count):
         f.without[i] = f.wanted[i] = impulses[i] if only_push else f.wanted[i]
         f.limit[i] = 0.0
-        f.sliding[i] = (
-            f.coefficient[i] if f.without[i] > 0.0 else 0.0
-        )  # contacts that pull get no friction
+        # contacts that pull get no friction
+        f.sliding[i] = f.coefficient[i] if f.without[i] > 0.0 else 0.0
     if not only_push and _settle(count, rank, work, f, d, scale, False):
         _trim(count, rank, work, f, False)
         return True
@@ -300,9 +298,8 @@ def _start(count, rank, work, push, f, d):
     minimum_norm_factors(d, count, rank, work.length, work)
     for j in range(rank):
         f.target[j] = dot_of(work.basis[j], change)
-    for j in range(
-        count * size
-    ):  # ∂p_n,i / ∂p_t,i: the change of a contact's normal impulse with its own friction
+    # ∂p_n,i / ∂p_t,i: the change of a contact's normal impulse with its own friction
+    for j in range(count * size):
         for i in range(rank):
             f.left[i] = -f.normal_part[j, i]
         f.wanted[:count] = 0.0
@@ -359,9 +356,8 @@ def _settle(count, rank, work, f, d, scale, pushes):
             own = f.p[i * size : (i + 1) * size]
             stride = 1.0
             length = math.sqrt(dot_of(own, own))
-            if (
-                length > 0.0 and length >= AT_LIMIT * f.limit[i]
-            ):  # Newton's step for a single sliding contact
+            # Newton's step for a single sliding contact
+            if length > 0.0 and length >= AT_LIMIT * f.limit[i]:
                 gain = f.sliding[i] * dot_of(f.response[i * size : (i + 1) * size], own) / length
                 stride = 1.0 / max(1.0 - gain, 1.0 / STRIDE)
             f.change[i] = f.sliding[i] * max(f.wanted[i], 0.0) - f.limit[i]
@@ -496,9 +492,8 @@ def _slide(f, i, d):
 def _stops(f, i, first):
     """Write into `velocity` the impulse that stops a contact with two tangents; False if it exceeds
     the limit."""
-    if (
-        f.velocity.shape[0] != 2
-    ):  # of two, steps of length 1/ρ would need κ(B_i B_iᵀ) sweeps; with a lever, hundreds
+    # of two, steps of length 1/ρ would need κ(B_i B_iᵀ) sweeps; with a lever, hundreds
+    if f.velocity.shape[0] != 2:
         return False
     xx = f.block[i, 0]
     xy = f.block[i, 1]

@@ -48,17 +48,15 @@ from iapb.numerics.linalg import (
 )
 from iapb.numerics.schema import Floats, Integers
 
-STICKING = (
-    1e-10  # m/s: a contact that slips more slowly sticks, with a friction in proportion to its slip
-)
+# m/s: a contact that slips more slowly sticks, with a friction in proportion to its slip
+STICKING = 1e-10
 ROUNDED = 1e-14  # m: points that are this close are together
 EXACT = 1e-20  # share of the energy of a step that the open balance of momentum may give the bodies
 GOOD = 1e-14  # the same, where rounding allows no better
 ITERATIONS = 60  # of Newton's method for given limits of friction
 TURNS = 12  # of the limits of friction in a step; the next step goes on from the last ones
-FREE_TURNS = (
-    3  # of these take the new limits whole; the others half, for limits that swing to and fro
-)
+# of these take the new limits whole; the others half, for limits that swing to and fro
+FREE_TURNS = 3
 DRY = -2  # in place of the first contact of a group that has joint friction alone
 SETTLED = 1e-3  # share of a limit of friction whose change ends the turns
 SEARCHES = 40  # evaluations of a line search

@@ -86,9 +86,8 @@ def vertices_half_plane(shapes, a, b, R, p, margin, buffer, count):
         x, y = corner(shapes, a, i)
         gap = mx * x + my * y + offset
         if gap <= margin:
-            depth = (
-                radius + 0.5 * gap
-            )  # from the vertex (or centre) back to midway between the surfaces
+            # from the vertex (or centre) back to midway between the surfaces
+            depth = radius + 0.5 * gap
             x, y = place(frame, x, y)
             count = store_contact(
                 shapes,
@@ -247,9 +246,8 @@ def _against_reference(shapes, ref, other, edge, separation, ref_is_b, R, p, mar
     my = xy * nx + yy * ny
     incident = 0
     opposed = math.inf
-    for i in range(
-        shapes.count[other]
-    ):  # the incident edge: its outward normal is most opposed to this one's
+    # the incident edge: its outward normal is most opposed to this one's
+    for i in range(shapes.count[other]):
         _, _, ox, oy, _ = edge_frame(shapes, other, i)
         if ox * mx + oy * my < opposed:
             incident = i
@@ -270,9 +268,8 @@ def _against_reference(shapes, ref, other, edge, separation, ref_is_b, R, p, mar
         start_s, start_h = (s0, separation) if h0 < h1 else (s1, separation)
         end_h = math.inf
 
-    side, opposite = (
-        (0, 1) if ref_is_b else (1, 0)
-    )  # vertex of the incident or of the reference edge
+    # vertex of the incident or of the reference edge
+    side, opposite = (0, 1) if ref_is_b else (1, 0)
     for s, h, vertex, end, cut in (
         (start_s, start_h, incident, following(shapes, ref, edge), s0 > length),
         (end_s, end_h, next_incident, edge, s1 < 0.0),

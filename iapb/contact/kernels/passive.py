@@ -24,9 +24,8 @@ from iapb.numerics.compiled import copy_into, kernel
 from iapb.numerics.double_double import least_energy, two_product, two_sum
 
 UNIT = 2.0**-53
-_UNDERFLOW = (
-    2.0**-1020
-)  # 2⁵⁴ η: a normal number, since each operation with a subnormal one takes 0.1 µs
+# 2⁵⁴ η: a normal number, since each operation with a subnormal one takes 0.1 µs
+_UNDERFLOW = 2.0**-1020
 _DROPPED = -800  # exponent relative to the largest term below which `wide_gain` omits a term
 _MOVES = 24  # of last places; four in ten candidates need none, most others one or two
 _GROWTH = 4.0  # of what is taken off a step, from one attempt to the next, should moves fail

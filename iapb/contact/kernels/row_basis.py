@@ -58,9 +58,8 @@ def _next_direction(columns, pivot, basis, rank):
         if left > 0.0:
             for k in range(q.shape[0]):
                 q[k] /= left
-        if (
-            turn > 0 and left > 0.5
-        ):  # orthogonal to rounding (Kahan, in Parlett 1980), nearly always in the first pass
+        # orthogonal to rounding (Kahan, in Parlett 1980), nearly always in the first pass
+        if turn > 0 and left > 0.5:
             return True
     return False
 

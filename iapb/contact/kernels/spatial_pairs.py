@@ -326,9 +326,8 @@ def clip_faces(
         inside, corner = _corner_of_overlap(number, c, e1, e2, sides, near)
         if number < 4 and corner[2] < deepest[2]:
             deepest = corner
-        if (
-            number == 24
-        ):  # no overlap seen along the normal, or rounding at a corner: take the deepest corner
+        # no overlap seen along the normal, or rounding at a corner: take the deepest corner
+        if number == 24:
             inside = count == start
             x = deepest[0]
             y = deepest[1]

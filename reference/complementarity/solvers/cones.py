@@ -71,9 +71,8 @@ def solve(problem: ImpactProblem, method: str) -> Answer:
         scaled[:: problem.contact_size] += shift
         offset.value = scaled
         try:
-            with (
-                warnings.catch_warnings()
-            ):  # "may be inaccurate": the status says so too, and residuals are recomputed
+            # "may be inaccurate": the status says so too, and residuals are recomputed
+            with warnings.catch_warnings():
                 warnings.simplefilter("ignore", UserWarning)
                 program.solve(solver=backend, **settings)
         except cp.error.SolverError as error:

@@ -21,13 +21,11 @@ from reference.complementarity.solution import Answer, residuals
 
 LARGEST_SIZE = 14  # 16384 active sets, some of them linear programs: seconds
 _SAME = 1e-9  # two solutions closer than this share of the larger one count as one
-_ACCEPTED = (
-    1e-9  # residual below which a candidate is a solution: solves of small systems reach 1e-13
-)
+# residual below which a candidate is a solution: solves of small systems reach 1e-13
+_ACCEPTED = 1e-9
 _SINGULAR = 1e-12  # reciprocal condition below which W_aa is taken as singular
-_FEASIBLE = (
-    1e-10  # tolerance of the linear program, the least that HiGHS accepts; its default is 1e-7
-)
+# tolerance of the linear program, the least that HiGHS accepts; its default is 1e-7
+_FEASIBLE = 1e-10
 
 
 def all_solutions(problem: ImpactProblem) -> list[Floats]:

@@ -21,9 +21,8 @@ from reference.complementarity.solution import Answer, velocity_scale
 
 _INEQUALITY = 0  # daqp's `sense` of a row
 _ACTIVE_SET = 1e-13  # accuracy for unit rows and unit velocities: a few hundred roundings
-_OPPOSED = (
-    1e-11  # accuracy where rounding makes opposed, nearly parallel rows contradict each other
-)
+# accuracy where rounding makes opposed, nearly parallel rows contradict each other
+_OPPOSED = 1e-11
 _INFINITE = 1e30  # daqp's value for an absent bound
 # accuracy requested for a problem scaled to unit W and b; the reached accuracy is measured
 _PROXQP = 1e-10

@@ -102,9 +102,8 @@ def test_an_impact_is_the_exact_one_in_every_unit(seed: int, clamp: bool, decade
     """v⁺ of (21), M(v⁺ − v) = P = Jᵀp, p of least norm; the interval encloses the exact change of
     energy, tightly."""
     M, J, v = problem(seed, decades=decades)
-    if (
-        decades < 1.0
-    ):  # dependent to the last bit of these rows only; in rationals of rank five at most
+    # dependent to the last bit of these rows only; in rationals of rank five at most
+    if decades < 1.0:
         J = np.vstack((J, 2.0 * J[2], J[1], 0.0 * J[0]))
     e = (0.0, 0.25, -0.5)[seed % 3]
     M = M + np.triu(M * EPS, 1) * (seed % 2)  # a skew part in the last bit belongs to M

@@ -592,9 +592,8 @@ class Step:
         force = force - self.m.gravity(self.q, self.system.gravity) - self.m.bias(self.q, v_plus)
         after = v_plus + h * np.linalg.solve(self.m.mass_matrix(self.q), force)
         q = self.m.integrate(self.q, after, h)
-        close = (
-            1e-5 if self.scene.contact.forces == "implicit" else ROUNDING
-        )  # Newton's method ends at 1e-14 of energy
+        # Newton's method ends at 1e-14 of energy
+        close = 1e-5 if self.scene.contact.forces == "implicit" else ROUNDING
         np.testing.assert_allclose(run.v[k + 1], after, atol=close * max(1.0, np.abs(after).max()))
         np.testing.assert_allclose(run.q[k + 1], q, atol=h * close * max(1.0, np.abs(after).max()))
 

@@ -59,9 +59,8 @@ def test_sound_laws_never_gain_energy_with_unequal_restitution(seed: int) -> Non
     contacts = 1 + seed % 5
     problem = random_problem(seed, contacts, np.random.default_rng(seed).uniform(size=contacts))
     assert gain(problem, poisson(problem).velocity) <= 1e-11
-    with suppress(
-        SolverError
-    ):  # Newton's velocities can be infeasible; Poisson always has a solution
+    # Newton's velocities can be infeasible; Poisson always has a solution
+    with suppress(SolverError):
         assert gain(problem, newton_lcp(problem).velocity) <= 1e-11
 
 
