@@ -455,18 +455,11 @@ class Step:
             np.testing.assert_allclose(
                 log.impulse[line, dofs], impulse[dofs], atol=ROUNDING * size * np.abs(M).max()
             )
-            lost = 0.5 * (v @ M @ v - v_plus[dofs] @ M @ v_plus[dofs])
-            assert log.energy_lost[line] == pytest.approx(lost, abs=ROUNDING * (v @ M @ v))
-            assert log.energy_lost[line] >= -1e-14 * (v @ M @ v)
-            assert (log.rows[line], log.solved[line]) == (len(J), solved)
-            assert log.scale[line] == pytest.approx(share, rel=1e-12)
+            assert (log.solved[line], log.scale[line]) == (solved, pytest.approx(share, rel=1e-12))
             assert (log.clamp[line], log.friction_share[line]) == pytest.approx(
                 (1.0, kept), abs=1e-6
             )
-            slow = J @ v_plus[dofs] + self.scene.contact.approach_velocity
-            assert (
-                log.approaching[line] == np.count_nonzero(slow < 0.0) or np.abs(slow).min() < 1e-9
-            )
+            self.check_line(line, J, M, v, v_plus[dofs])
         size = np.abs(impulse).max(initial=1e-3)
         np.testing.assert_allclose(self.run.impulse[self.k], impulse, atol=ROUNDING * size)
         pushed = np.zeros(self.m.nv)
@@ -480,6 +473,18 @@ class Step:
         if not (self.only_push(self.collides) or self.law.friction_in_impacts):
             np.testing.assert_allclose(self.table["impulse"], p_of, atol=1e-7 * size)
         return v_plus, spreading
+
+    def check_line(
+        self, line: int, J: np.ndarray, M: np.ndarray, v: np.ndarray, after: np.ndarray
+    ) -> None:
+        """The energy of an impact, its rows, and those that still approach."""
+        log = self.run.impacts
+        lost = 0.5 * (v @ M @ v - after @ M @ after)
+        assert log.energy_lost[line] == pytest.approx(lost, abs=ROUNDING * (v @ M @ v))
+        assert log.energy_lost[line] >= -1e-14 * (v @ M @ v)
+        assert log.rows[line] == len(J)
+        slow = J @ after + self.scene.contact.approach_velocity
+        assert log.approaching[line] == np.count_nonzero(slow < 0.0) or np.abs(slow).min() < 1e-9
 
     def check_forces(self, v_plus: np.ndarray) -> None:
         """(5), (6) at what does not collide; or the implicit forces and Coulomb's law at the end of
@@ -495,7 +500,6 @@ class Step:
             penalty = penalty + J.T @ c.normal * normal
             friction = friction + J.T @ drag
             force, explicit = paper.resting(self.scene, c, J, v_plus)
-            mu = paper.own_values(self.scene, c)[1]
             size = given.stiffness * 1e-3
             if given.forces == "implicit":
                 soft = given.stiffness * h + given.damping
@@ -517,45 +521,58 @@ class Step:
             if given.forces == "paper":
                 np.testing.assert_allclose(drag, explicit, atol=ROUNDING * size)
                 continue
-            slip = J @ after - (c.normal @ J @ after) * c.normal
-            limit = mu * max(normal, 0.0)
-            assert (
-                np.linalg.norm(drag) <= limit * (1.0 + 2e-3) and abs(drag @ c.normal) < 1e-9 * size
-            )
-            apart, slid, drift, certain = self.stuck.get(c.name, (np.zeros_like, 0.0, None, True))
-            moved = apart(self.q)[:3]
-            drift = None if drift is None else drift + moved
-            arc = (moved - slid + (0.0 if drift is None else drift)) / h
-            slip = slip + arc - (arc @ c.normal) * c.normal
-            sticks = np.linalg.norm(drag) < 0.99 * limit
-            slow = np.linalg.norm(slip) < 20.0 * STICKS + 0.05 * np.linalg.norm(arc)
-            if normal > 0.0:
-                drift = (np.zeros(3) if drift is None else drift) if slow else None
-                self.sticks[c.name] = self.parting(c), h * J @ after, drift, sticks or not slow
-            if not certain:  # at the limit, it may have stuck or slid
-                continue
-            if sticks:
-                assert np.linalg.norm(slip) <= STICKS + 0.05 * np.linalg.norm(arc)
-            elif not slow:
-                np.testing.assert_allclose(
-                    drag, -limit * slip / np.linalg.norm(slip), atol=2e-2 * limit
-                )
+            self.check_friction(c, J, normal, drag)
         np.testing.assert_allclose(self.run.penalty_force[self.k], penalty, atol=1e-6)
+        self.check_damping(friction)
+
+    def check_friction(
+        self, c: paper.Contact, J: np.ndarray, normal: float, drag: np.ndarray
+    ) -> None:
+        """Coulomb's law at the end of the step, for points that follow arcs."""
+        h = self.system.dt
+        after = self.run.v[self.k + 1]
+        slip = J @ after - (c.normal @ J @ after) * c.normal
+        limit = paper.own_values(self.scene, c)[1] * max(normal, 0.0)
+        size = self.scene.contact.stiffness * 1e-3
+        assert np.linalg.norm(drag) <= limit * (1.0 + 2e-3) and abs(drag @ c.normal) < 1e-9 * size
+        apart, slid, drift, certain = self.stuck.get(c.name, (np.zeros_like, 0.0, None, True))
+        moved = apart(self.q)[:3]
+        drift = None if drift is None else drift + moved
+        arc = (moved - slid + (0.0 if drift is None else drift)) / h
+        slip = slip + arc - (arc @ c.normal) * c.normal
+        sticks = np.linalg.norm(drag) < 0.99 * limit
+        slow = np.linalg.norm(slip) < 20.0 * STICKS + 0.05 * np.linalg.norm(arc)
+        if normal > 0.0:
+            drift = (np.zeros(3) if drift is None else drift) if slow else None
+            self.sticks[c.name] = self.parting(c), h * J @ after, drift, sticks or not slow
+        if not certain:  # at the limit, it may have stuck or slid
+            return
+        if sticks:
+            assert np.linalg.norm(slip) <= STICKS + 0.05 * np.linalg.norm(arc)
+        elif not slow:
+            along = slip / np.linalg.norm(slip)
+            np.testing.assert_allclose(drag, -limit * along, atol=2e-2 * limit)
+
+    def check_damping(self, friction: np.ndarray) -> None:
+        """What the recorded friction has beside that of the contacts: joint damping; it never
+        drives."""
+        after = self.run.v[self.k + 1]
+        implicit = self.scene.contact.forces == "implicit"
         damped = np.zeros(self.m.nv)
         for start, body in zip(self.m.arrays.v_start, self.scene.bodies, strict=True):
             damped[start : start + len(body.joint_damping or ())] = body.joint_damping or ()
         lost = self.run.friction_force[self.k] - friction
         if damped.any():  # a damped joint slows by what its damping makes of its own new velocity
             assert np.all(lost[damped == 0.0] == pytest.approx(0.0, abs=1e-9))
-            if not self.contacts or given.forces == "implicit":
+            if not self.contacts or implicit:
                 np.testing.assert_allclose(lost, -damped * after, atol=1e-9)
         else:
             np.testing.assert_allclose(lost, 0.0, atol=1e-6)
             # points that touch follow arcs, J v their tangents: an angle of |ω| Δt
             drag = self.run.friction_force[self.k]
-            turned = h * np.abs(after).max()
+            turned = self.system.dt * np.abs(after).max()
             most = 1e-9 + turned * np.abs(drag) @ np.abs(after)
-            assert drag @ after <= most or given.forces == "paper"
+            assert drag @ after <= most or not implicit
 
     def parting(self, c: paper.Contact) -> Callable[[np.ndarray], np.ndarray]:
         """Return how far the points that touch now are apart at another q."""
