@@ -5,8 +5,8 @@
 uses (`iapb.contact.laws`).
 
 Prints:
-    impulse-augmented … the peg is at x = …
-    impulses only … the peg is at x = 10.416 mm, y = -5.208 mm
+    impulse-augmented penalty the peg is at x = 10.340 mm, y = -5.050 mm
+    impulses only the peg is at x = 10.416 mm, y = -5.208 mm
 """
 
 from dataclasses import dataclass, field

@@ -3,7 +3,7 @@
 In the project it is a file of `verification`, and one line of `COMPARED` in verification/methods.py.
 
 Prints:
-    True, worst: …
+    True, worst: kinetic_energy
 """
 
 import numpy as np
