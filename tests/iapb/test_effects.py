@@ -42,6 +42,7 @@ def test_a_scene_alone_switches_the_effect_and_the_reason_has_its_values(name: s
 RIGID = RigidConstraints()
 RUBBING = "impulse-augmented penalty with impact friction"
 ROUGH = PEG.with_values({"contact.friction": 0.3})
+HALF_SMOOTH = ROUGH.with_values({f"walls.{PEG.walls[0].name}.friction": 0.0})
 BARE = PEG.with_values({"couplings": {}})
 PER_BODY = ROUGH.with_values({"contact.self_collision_rows": "per_body"})
 GAINS = FourChannel((5.0, 6.0, 7.0), (1.0, 1.0, 1.0))
@@ -66,6 +67,8 @@ CHOSEN: list[tuple[str, Scene, tuple[Any, ...], bool, str, str]] = [
         for law, on in (("penalty", True), (RIGID, False))
     ),
     ("friction", PEG.with_values({"contact.friction": 0.0}), (RIGID,), False, RIGID.name, ""),
+    ("friction", HALF_SMOOTH, (), True, "friction 0 to 0.3", ""),
+    ("impact_friction", HALF_SMOOTH, (RUBBING,), True, "friction 0 to 0.3", ""),
     *(
         (name, JOINTED, (DRIFTING,), False, "'drifting' does not use it", name)
         for name in ("joint_damping", "joint_limits")
