@@ -275,6 +275,25 @@ def test_friction_never_leaves_its_cone_and_leaves_no_contact_closing(size: int)
         assert v - v_free == pytest.approx(change, abs=1e-9)
 
 
+def test_of_answers_that_have_not_converged_the_best_counts(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A mass of 1 kg that a contact stops: p = 1 N s, found with an error of a few 1e-7."""
+    errors = iter([5e-7, 1e-7, 3e-7])
+    right = stepping.solve
+
+    def inexact(problem: Any, solver: str) -> Any:
+        found = right(problem, solver)
+        return replace(found, impulse=found.impulse * (1.0 + next(errors)))
+
+    monkeypatch.setattr(stepping, "solve", inexact)
+    rows = np.eye(3)[None]
+    _, normal, _ = friction_step(
+        np.eye(3), np.array([-1.0, 0.0, 0.0]), rows[:, 0], rows[:, 1:], np.zeros(1), 0.3
+    )
+    assert normal[0] - 1.0 == pytest.approx(1e-7, rel=1e-3)
+
+
 def test_contacts_without_a_common_body_are_solved_apart() -> None:
     rng = np.random.default_rng(5)
     parts = rng.normal(size=(2, 3, 3, 6))
