@@ -228,8 +228,13 @@ FORGED: dict[str, tuple[Callable[[Run], Run], set[str]]] = {
 }
 
 
+@pytest.mark.parametrize("steps", [1 << 16, 7])
 @pytest.mark.parametrize("name", FORGED)
-def test_what_is_forged_in_a_record_fails_in_its_residual(cradle: Run, name: str) -> None:
+def test_what_is_forged_in_a_record_fails_in_its_residual(
+    cradle: Run, name: str, steps: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also if the record is judged in pieces of a few steps."""
+    monkeypatch.setattr(verification.certificate, "_STEPS", steps)
     forge, failing = FORGED[name]
     found = certify(forge(cradle))
     limits = {"gains": 0.0, "momentum": 1e-9, "span": 1e-9, "total": 1e-9, "restitution": 1e-6}
