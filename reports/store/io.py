@@ -88,16 +88,7 @@ def written_aside(target: Path, *, replace: bool, synced: bool = True) -> Iterat
             yield aside
             if synced:
                 _sync(aside)
-            if replace:
-                os.replace(aside, target)
-            else:
-                try:
-                    os.link(aside, target)  # fails when the target exists, unlike a rename
-                except FileExistsError:
-                    return
-                except OSError:  # a file system without hard links
-                    if not target.exists():
-                        os.rename(aside, target)
+            _put_in_place(aside, target, replace)
             if synced:
                 _sync(target.parent)
         finally:
@@ -107,13 +98,31 @@ def written_aside(target: Path, *, replace: bool, synced: bool = True) -> Iterat
         # of another file, read meanwhile
         if named not in target.parents and named.parent != target.parent:
             raise
-        number = re.search(
-            r"errno = (\d+)", str(error)
-        )  # the HDF5 library includes the number in its message
-        why = getattr(error, "strerror", None) or (os.strerror(int(number[1])) if number else error)
         raise RunFileError(
-            f"{target}: cannot be written: {why}; the previous file is unchanged"
+            f"{target}: cannot be written: {_reason(error)}; the previous file is unchanged"
         ) from error
+
+
+def _put_in_place(aside: Path, target: Path, replace: bool) -> None:
+    """Move a complete file to its place; a target that exists stays unless `replace`."""
+    if replace:
+        os.replace(aside, target)
+        return
+    try:
+        os.link(aside, target)  # fails when the target exists, unlike a rename
+    except FileExistsError:
+        pass
+    except OSError:  # a file system without hard links
+        if not target.exists():
+            os.rename(aside, target)
+
+
+def _reason(error: OSError | RuntimeError) -> Any:
+    """Return why a file could not be written; the HDF5 library has the number in its message."""
+    if said := getattr(error, "strerror", None):
+        return said
+    number = re.search(r"errno = (\d+)", str(error))
+    return os.strerror(int(number[1])) if number else error
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
