@@ -82,11 +82,6 @@ def _of_evidence(evidence: Evidence) -> Iterator[tuple[str, Table]]:
     for claim in evidence.claims:
         for name, table in claim.tables.items():
             yield f"claims/{claim.key}" + (f", {name}" if name != claim.key else ""), table
-    broken = tuple((f"{one.title}: {one.question}", one.answer) for one in evidence.counterexamples)
-    yield (
-        "counterexamples",
-        titled(("who and law", "what happens"), broken, prose=("what happens",)),
-    )
     yield from (
         (f"inputs/{name}", value)
         for name, value in evidence.inputs.items()

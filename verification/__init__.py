@@ -13,13 +13,11 @@ from iapb.lazy import lazy_names
 if TYPE_CHECKING:
     from verification.cost.accuracy import which_method as which_method
     from verification.cost.accuracy import work_precision as work_precision
-    from verification.laws import bulk_impacts as bulk_impacts
     from verification.laws import check_passivity as check_passivity
     from verification.worlds import compare_worlds as compare_worlds
 
 _HOME = {
     "check_passivity": "verification.laws",
-    "bulk_impacts": "verification.laws",
     "which_method": "verification.cost.accuracy",
     "work_precision": "verification.cost.accuracy",
     "compare_worlds": "verification.worlds",

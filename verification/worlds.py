@@ -60,6 +60,7 @@ from verification.finding import (
     attempt,
     finding_of,
 )
+from verification.scenes.books import risen, work_given
 from verification.table import Row, Table, table_from
 
 Progress = Callable[[str, int, int], None]
@@ -327,14 +328,8 @@ def _world(name: str, ran: Ran, apart: Series | None, fastest: float) -> Row:
     if (
         run.coupling != "unilateral"
     ):  # that coupler moves the tool at times, so there is no energy balance
-        work = np.concatenate(
-            [[0.0], run.energy["hand_work"] + run.energy.get("coupling_work", 0.0)]
-        )
-        total = run.energy["kinetic"] + run.energy["potential"]
-        above = total - total[0] - work
-        books = dict(
-            zip(books, (float(work[-1]), 0.0 - float(above[-1]), float(above.max())), strict=True)
-        )
+        work, above = float(work_given(run)[-1]), risen(run)
+        books = dict(zip(books, (work, 0.0 - float(above[-1]), float(above.max())), strict=True))
     touching = run.records_contacts
     return {
         "world": name,

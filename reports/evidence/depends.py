@@ -14,15 +14,12 @@ ABSENT = "absent"
 
 # stage -> folders beside the project that it reads where they exist
 FOLDERS: dict[str, tuple[str, ...]] = {
-    "mechanics": ("robots",),
-    "complementarity": ("problems",),
-    "hard cases": ("problems",),
+    "complementarity": ("robots",),
     "haptic-rate": ("robots",),
 }
 # stage -> packages that it compares with, or leaves out where they are absent
 PACKAGES: dict[str, tuple[str, ...]] = {
-    "engines": ("mujoco",),
-    "mechanics": ("pin", "coal"),
+    "hard-cases": ("mujoco", "pin"),
     "accuracy": ("daqp", "quantecon"),
     "complementarity": (
         "cvxpy",
@@ -35,6 +32,7 @@ PACKAGES: dict[str, tuple[str, ...]] = {
         "proxsuite",
         "quantecon",
         "pin",
+        "coal",
     ),
     "haptic-rate": ("mujoco", "pin", "daqp", "quadprog", "proxsuite", "quantecon"),
 }

@@ -29,7 +29,6 @@ from verification.check import Study
 from verification.claims import peg
 from verification.cost import effects
 from verification.finding import Failure, Finding, attempt
-from verification.hard_cases.findings import on_hard_cases
 from verification.proofs import on_proofs
 from verification.proofs.coq import checked
 
@@ -38,7 +37,7 @@ Progress = Callable[[str, int, int], None]
 # study that draws random numbers -> module with its SEED
 SEEDS = {
     "claims": "verification.check",
-    "properties": "verification.laws.topic",
+    "impacts": "verification.laws.bulk",
     "proofs": "verification.proofs.numbers",
     "robots": "verification.mechanics.against_pinocchio",
     "mass matrices": "verification.mechanics.definiteness",
@@ -52,10 +51,10 @@ SHOWN_SCENES = (
     "arm_pushing",
 )
 FIGURE_RUNS = "runs of the figures"
-CERTIFIED = "exact-energy"  # the stage that needs all runs of the others
+CERTIFIED = "energy"  # the stage that needs all runs of the others
 # The first stages to be computed are the longest.
 ON_THE_PEG = "claims on the peg"
-FIRST = ("proofs", ON_THE_PEG, "properties", "claims")
+FIRST = ("proofs", ON_THE_PEG, "hard-cases", "energy, without times", "claims")
 BESIDE = "parts that measure no time"
 
 
@@ -96,14 +95,8 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
             key=lambda claim: claim.key,
         )
     )
-    gains, properties, *others = (stages[name].records or _failed(stages[name]) for name in TOPICS)
-    topics = [
-        gains,
-        finding("proofs", partial(on_proofs, development=checked.read())),
-        properties,
-        finding("hard cases", on_hard_cases),
-        *others,
-    ]
+    topics = [stages[name].records or _failed(stages[name]) for name in TOPICS]
+    topics.append(finding("proofs", partial(on_proofs, development=checked.read())))
     topics = [
         haptic_rate.quoting(topic, (*ledger, *topics))
         if topic.key == haptic_rate.TOPIC.key
@@ -136,9 +129,6 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
         inputs=inputs,
         scenes=scenes,
         claims=ledger,
-        proofs=stages["proofs"].records or (),
-        counterexamples=stages["counterexamples"].records or (),
-        hard_cases=stages["hard cases"].records or (),
         effects=shown,
         topics=tuple(topics),
         failed=failed,

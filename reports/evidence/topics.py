@@ -9,15 +9,13 @@ from functools import partial
 from importlib import import_module
 from typing import Any
 
-from reports.evidence.exact_energy import CERTIFIED_RUNS
+from reports.evidence.energy import CERTIFIED_RUNS
 from reports.runner import Runner
 from verification import claims
 from verification.claims import peg
 from verification.cost.accuracy import work_precision
 from verification.cost.effects import effects_of_scenes
 from verification.finding import NOT_COMPUTED, Failure, Finding, Part, finding_of
-from verification.hard_cases.findings import hard_cases
-from verification.laws.topic import counterexamples
 from verification.proofs import check_all
 from verification.proofs.show import ProofRecord
 from verification.table import Table
@@ -27,17 +25,13 @@ Progress = Callable[[int, int], None]
 # key of the finding -> module and name of its topic: a `Topic`, or a function (run, depth,
 # progress)
 TOPICS: dict[str, str] = {
-    "energy-gains": "verification.laws.topic:energy_gains",
-    "properties": "verification.laws.topic:properties",
-    "mechanics": "verification.mechanics.mechanics:mechanics",
-    "scene-ledger": "verification.scenes.ledger:scene_ledger",
+    "hard-cases": "verification.hard_cases.topic:TOPIC",
     "stability": "verification.stability.topic:contact_stability",
     "complementarity": "verification.complementarity.topic:TOPIC",
-    "engines": "verification.engines:engines",
     "haptic-rate": "verification.haptic_rate:TOPIC",
     "survival": "reports.evidence.survival:compute",
     # last: it certifies the runs of all others
-    "exact-energy": "reports.evidence.exact_energy:TOPIC",
+    "energy": "reports.evidence.energy:TOPIC",
 }
 
 
@@ -139,10 +133,6 @@ def plans() -> dict[str, Plan]:
             for stage in CLAIM_STAGES
         },
         "proofs": Plan(tuple[ProofRecord, ...], lambda *given: check_all(*given[2:])),
-        "counterexamples": Plan(tuple[Finding, ...], lambda *given: counterexamples(*given[2:])),
-        "hard cases": Plan(
-            tuple[Finding, ...], lambda runner, _, *given: hard_cases(runner, *given), timed=True
-        ),
         "accuracy": Plan(
             Table,
             lambda runner, depth, progress, failures: work_precision(

@@ -7,11 +7,10 @@ from reports.figures import (  # noqa: F401
     complementarity,
     corner,
     cost,
-    energy_gains,
+    energy,
     film,
-    mechanics,
+    hard_cases,
     paper,
-    scenes,
     stability,
     tilts,
 )

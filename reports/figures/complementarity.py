@@ -1,182 +1,185 @@
-"""IAPB against complementarity: where their motions agree, and when every impulse pushes."""
+"""When formula and complementarity agree: two landings of a bar, the map, and how often they do."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from reports.figures.figure import Drawn, Panel, recipe
-from reports.figures.plot import Plot, note
+from markupsafe import Markup
+
+from reports.figures.figure import Drawn, Panel, grid, recipe
+from reports.figures.numbers import format_number
+from reports.figures.plot import Plot, arrow, note
 from reports.figures.style import (
     BLUE,
     BOUND,
+    FORCE,
+    GREEN,
     INK,
     MUTED,
-    OUTCOMES,
-    PAPER,
-    VERMILION,
-    line_arguments,
-    looks_of,
+    PEG,
+    WALL,
+    LineStyle,
+    css,
 )
+from verification.complementarity.agreement import RANDOM, SCENE
+from verification.complementarity.landings import HALF_LENGTH
+from verification.complementarity.landings import PEG as PAPERS_PEG
 from verification.table import Table
 
-Rows = list[dict[str, Any]]
+Row = Mapping[str, Any]
 
+_TITLES = {"A": "A: posts far apart, both push", "B": "B: posts close, the formula must pull"}
+_THICK, _FLOOR, _LONG = 0.09, -0.55, 0.42  # of the bar, below it, of the longest arrow [m]
 _BORDER = ("cosine", "speed ratio", "agreement predicted", "agreement found")
-_SIZES = {0.0: 3.4, 0.5: 4.6, 1.0: 5.8}  # marker by restitution
+_WIDEST = 9.0  # [em] of the longest bar
 
 
-@recipe("agreement-map", "complementarity/map", "complementarity/two contacts")
-def agreement_map(numbers: Table, border: Table) -> Drawn:
-    """Draw the share of impacts that agree, the distance in the other impacts, and the border r = c
-    of two contacts."""
-    rows = [row for row in numbers.records() if not row["impacts"].startswith("scene ")]
-    kinds: dict[str, Rows] = {}
-    for row in rows:
-        kinds.setdefault(f"{row['impacts']}, {row['redundant rows']}", []).append(row)
-    size = (4.6, 0.24 * len(kinds) + 0.7)
-    with (
-        Plot("agreement-map-share", size) as shares,
-        Plot("agreement-map-distance", size) as distances,
-    ):
-        for y, members in enumerate(kinds.values()):
-            found = [row["share that agrees"] for row in members]
-            shares.axes.barh(y, 1.0, height=0.62, color=VERMILION, alpha=0.18, linewidth=0)
-            shares.axes.barh(y, sum(found) / len(found), height=0.62, color=BLUE, linewidth=0)
-            shares.axes.plot(found, [y] * len(found), "|", color=INK, markersize=7)
-            apart = [row for row in members if row["median distance where they differ"] is not None]
-            if not apart:
-                distances.axes.plot(
-                    0.0, y, "o", markersize=4, markerfacecolor=PAPER, markeredgecolor=MUTED
-                )
-            for row in apart:
-                typical, shift = (
-                    row["median distance where they differ"],
-                    y + 0.22 * (2.0 * row["e"] - 1.0),
-                )
-                distances.axes.plot(
-                    [typical, row["largest distance"]], [shift] * 2, color=VERMILION, linewidth=1.1
-                )
-                distances.axes.plot(
-                    typical,
-                    shift,
-                    "X",
-                    color=VERMILION,
-                    markeredgecolor=PAPER,
-                    markeredgewidth=0.4,
-                    markersize=_SIZES.get(row["e"], 4.6),
-                )
-        for plot in (shares, distances):
-            plot.axes.set_yticks(range(len(kinds)), list(kinds))
-            plot.axes.set_ylim(len(kinds) - 0.5, -0.5)
-            plot.axes.grid(False, axis="y")
-        shares.axes.set(xlim=(0.0, 1.005), xlabel="share of impacts with one motion")
-        distances.axes.set(xlim=(-0.03, 2.05), xlabel="distance of v⁺, of |v⁻| (ring: none differ)")
-    with Plot("agreement-map-border", (4.1, 3.4)) as plot:
-        plot.curve([(0.0, 0.0), (1.0, 1.0)], BOUND, marked=False)
-        for cosine, ratio, predicted, agrees in border.select(_BORDER).rows:
-            plot.axes.plot(
-                cosine,
-                ratio,
-                "o" if agrees else "x",
-                color=BLUE if agrees else VERMILION,
-                markersize=6,
-                markeredgewidth=1.4,
+@recipe("condition", "complementarity/landings", "complementarity/two contacts")
+def condition(landings: Table, border: Table) -> Drawn:
+    """Draw the two landings and the map of cosine and speed ratio."""
+    rows = {row["impact"]: row for row in landings.records()}
+    drawn = [rows[name] for name in _TITLES]
+    most = max(abs(row[f"impulse at the {side}"]) for row in drawn for side in ("left", "right"))
+    panels = [Panel(_landing(row, most), _said(row), _TITLES[row["impact"]]) for row in drawn]
+    right = sum(row["agreement predicted"] == row["agreement found"] for row in border.records())
+    words = f"Both motions agree where r >= c at {right} of {len(border.rows)} points."
+    panels.append(Panel(_map(border, drawn, rows[PAPERS_PEG]["c"]), words, "both, over c and r"))
+    return Drawn(panels, border)
+
+
+def _said(row: Row) -> str:
+    left, right = row["impulse at the left"], row["impulse at the right"]
+    return f"A bar lands on two posts: the impulses are {left:.2g} and {right:.2g} N s."
+
+
+def _landing(row: Row, most: float) -> str:
+    """Draw the bar, its posts, the speeds at which it comes down, and the impulses of (21)."""
+    post = row["post from the middle"]
+    speeds = {-post: 1.0, post: row["r"]}
+    impulses = {-post: row["impulse at the left"], post: row["impulse at the right"]}
+    with Plot(f"landing-{row['impact']}", (3.4, 2.6), bare=True) as plot:
+        axes = plot.axes
+        axes.set(xlim=(-1.6, 1.6), ylim=(-1.15, 0.75), aspect="equal")
+        axes.plot([-1.2, 1.2], [_FLOOR] * 2, color=MUTED, linewidth=1.0)
+        if min(impulses.values()) < 0.0:
+            _tilted(axes, post, row["r"])
+        axes.fill(*_bar(0.0, 0.0), facecolor=PEG, edgecolor=INK, linewidth=1.1, zorder=3)
+        for place, speed in speeds.items():
+            axes.fill(
+                [place - 0.06, place, place + 0.06],
+                [_FLOOR, 0.0, _FLOOR],
+                facecolor=WALL,
+                edgecolor=MUTED,
+                linewidth=0.7,
             )
-            if predicted != agrees:
-                plot.axes.plot(
-                    cosine, ratio, "s", markersize=12, markerfacecolor="none", markeredgecolor=INK
-                )
-        plot.axes.set(
-            xlim=(-1.02, 1.02),
-            ylim=(0.0, 1.06),
-            xlabel="cosine c of the two rows",
-            ylabel="speed ratio r",
-        )
-    whole = sorted(
-        {row["impacts"] for row in rows}
-        - {row["impacts"] for row in rows if row["share that agrees"] < 1}
-    )
-    right = sum(predicted == agrees for predicted, agrees in border.select(_BORDER[2:]).rows)
-    panels = (
-        Panel(
-            shares.svg,
-            f"Shares of impacts with one motion, by kind; all of them for {', '.join(whole)}.",
-            "share of impacts that agree",
-        ),
-        Panel(distances.svg, "Distances of the motions, by kind.", "distance where they differ"),
-        Panel(
-            plot.svg,
-            f"Agreement of two contacts is as predicted by r >= c at {right} of {len(border.rows)} points.",
-            "two contacts",
-        ),
-    )
-    return Drawn(
-        panels, numbers, {"agree": OUTCOMES["holds"], "differ": OUTCOMES["fails"], "r = c": BOUND}
-    )
-
-
-_COUNTS = (5, 10, 20, 50, 100, 200)  # ticks
-
-
-@recipe("where-to-stop", "complementarity/piles")
-def where_to_stop(numbers: Table) -> Drawn:
-    """Draw over the contacts how often (21) is right, and how many of its impulses pull."""
-    rows = numbers.records()
-    looks = looks_of(f"(21) for all {given} contacts" for given in numbers.column("rows"))
-    limit = max(row["most contacts that agree"] for row in rows)
-    wrong = min(
-        (row["contacts"] for row in rows if row["share that agrees"] < 1.0), default=limit + 1
-    )
-    prices = [row["time of pushing"] / row["time of (21)"] for row in rows]
-    panels = list[Panel]()
-    for key, alt, label, axis in (
-        (
-            "share that agrees",
-            f"No pile of more than {limit} contacts agrees.",
-            "how often (21) agrees with complementarity",
-            "piles that agree [%]",
-        ),
-        (
-            "share of impulses that pull",
-            "Share of impulses that pull over contacts.",
-            "impulses of (21) that pull",
-            "impulses that pull [%]",
-        ),
-    ):
-        with Plot(f"where-to-stop-{key.split()[-1]}") as plot:
-            for name, look in looks.items():
-                plot.marks(
-                    [
-                        (row["contacts"], 100.0 * row[key])
-                        for row in rows
-                        if f" {row['rows']} " in name
-                    ],
-                    look,
-                )
-            plot.axes.axvline(limit, **line_arguments(BOUND, marked=False))
-            words = f"{limit}: the largest that ever agreed" if not panels else ""
+            arrow(axes, (place, 0.12 + 0.35 * speed), (0.0, -0.35 * speed), color=MUTED, width=1.2)
             note(
-                plot.axes,
-                (limit, 0.97),
-                words,
-                (4, 0),
-                ha="left",
-                va="top",
-                xycoords=plot.axes.get_xaxis_transform(),
+                axes,
+                (place, 0.16 + 0.35 * speed),
+                f"speed {speed:g}",
+                (0, 5),
+                fontsize=8.5,
+                color=MUTED,
             )
-            plot.axes.set(xlabel="contacts at once", ylabel=axis, xscale="log", ylim=(-4.0, None))
-            plot.axes.set_xticks(_COUNTS, [str(count) for count in _COUNTS])
-            plot.axes.minorticks_off()
-        panels.append(Panel(plot.svg, alt, label))
+            _impulse(axes, place, impulses[place], most)
+    return plot.svg
+
+
+def _bar(height: float, angle: float, about: float = 0.0) -> tuple[list[float], list[float]]:
+    """Return the corners of the bar, turned about a point of its lower face."""
+    corners = [
+        (-HALF_LENGTH, 0.0),
+        (HALF_LENGTH, 0.0),
+        (HALF_LENGTH, _THICK),
+        (-HALF_LENGTH, _THICK),
+    ]
+    c, s = math.cos(angle), math.sin(angle)
+    x = [about + c * (a - about) - s * b for a, b in corners]
+    y = [height + s * (a - about) + c * b for a, b in corners]
+    return x, y
+
+
+def _tilted(axes: Any, post: float, ratio: float) -> None:
+    """Draw the bar a moment after impulses that only push: its right end flies up."""
+    axes.fill(*_bar(0.0, 0.16, -post), fill=False, edgecolor=MUTED, linestyle="--", linewidth=1.0)
+    note(axes, (0.72, 0.47), "pushing only:\nthis end flies up", fontsize=8.5, color=MUTED)
+
+
+def _impulse(axes: Any, place: float, impulse: float, most: float) -> None:
+    """Draw an impulse under its post, upwards if it pushes."""
+    length = _LONG * abs(impulse) / most
+    pushes = impulse > 0.0
+    color, tail = (GREEN, -0.62 - length) if pushes else (FORCE, -0.62)
+    arrow(axes, (place, tail), (0.0, length if pushes else -length), color=color, width=2.4)
+    words = f"{'pushes' if pushes else 'pulls'} {format_number(abs(impulse), 2)}"
+    side = "right" if place < 0.0 else "left"
+    offset = (-7, 0) if place < 0.0 else (7, 0)
+    note(axes, (place, -0.8), words, offset, ha=side, color=color, fontsize=8.5, fontweight="bold")
+
+
+def _map(border: Table, drawn: Sequence[Row], peg: float) -> str:
+    """Draw the points of the grid over c and r, and where A, B and the paper's peg are."""
+    with Plot("condition-map", (4.1, 3.2)) as plot:
+        axes = plot.axes
+        axes.fill([0.0, 1.0, 1.0], [0.0, 1.0, 0.0], facecolor=FORCE, alpha=0.12, linewidth=0)
+        plot.curve([(0.0, 0.0), (1.0, 1.0)], BOUND, marked=False)
+        for cosine, ratio, _, agrees in border.select(_BORDER).rows:
+            mark, color = ("o", GREEN) if agrees else ("x", FORCE)
+            axes.plot(cosine, ratio, mark, color=color, markersize=6, markeredgewidth=1.6)
+        for row in drawn:
+            axes.plot(row["c"], row["r"], "o", markersize=13, fillstyle="none", color=INK)
+            note(axes, (row["c"], row["r"]), row["impact"], (-13, 0), fontweight="bold")
+        axes.axvline(peg, color=BLUE, linewidth=1.6)
+        note(axes, (peg, 1.13), f"the paper's peg, c = {peg:.2f}", (-4, 0), ha="right", color=BLUE)
+        note(axes, (-0.55, 0.55), "same motion", color=GREEN, fontweight="bold")
+        note(axes, (0.72, 0.135), "must pull", color=FORCE, fontweight="bold")
+        axes.set(
+            xlim=(-1.02, 1.02),
+            ylim=(0.0, 1.2),
+            xlabel="c: how a push at one contact moves the other",
+            ylabel="r: speed of the slower contact",
+        )
+        axes.grid(False)
+    return plot.svg
+
+
+@recipe("how-often", "complementarity/map")
+def how_often(numbers: Table) -> Drawn:
+    """Draw the impacts that agree and differ by kind, as bars on one scale."""
+    most = max(numbers["cases"])
+    panels = []
+    for kind, title in ((RANDOM, "random impacts"), (SCENE, "impacts of our scenes")):
+        rows = sorted(
+            numbers.where(kind=kind).records(), key=lambda row: float(-row["agree"] / row["cases"])
+        )
+        lines = {row["impacts"].replace("_", " "): _cells(row, most) for row in rows}
+        table = grid(("same", "differ", "impacts", "same [%]"), lines, "plain bars")
+        panels.append(Panel(table, f"{title}: how many agree.", title))
     return Drawn(
         panels,
         numbers,
-        looks,
-        {
-            "limit": limit,
-            "wrong": f"{wrong:.0f}",
-            "pushed": max(row["pushing from the LCP"] for row in rows),
-            "least": f"{min(prices):.2g}",
-            "most": f"{max(prices):.2g}",
-        },
+        {"same velocity": _square(GREEN), "differ: an impulse must pull": _square(FORCE)},
     )
+
+
+def _cells(row: Row, most: int) -> list[Markup]:
+    width = _WIDEST / most
+    bar = Markup("").join(
+        Markup('<i style="width:{:.2f}em;background:{}"></i>').format(width * row[key], css(color))
+        for key, color in (("agree", GREEN), ("differ", FORCE))
+        if row[key]
+    )
+    share = format_number(100.0 * row["agree"] / row["cases"], 2)
+    number = Markup('<td class="n">{}</td>').format
+    return [
+        number(f"{row['agree']:,}"),
+        number(f"{row['differ']:,}"),
+        Markup('<td class="bar">{}</td>').format(bar),
+        number("100" if row["differ"] == 0 else share),
+    ]
+
+
+def _square(color: str) -> LineStyle:
+    return LineStyle(color, "s", (), 0.0)

@@ -24,7 +24,6 @@ from reports.pages.page import PAGES
 from reports.pages.records import Evidence
 from verification import finding
 from verification.finding import Failure, Finding, Part
-from verification.hard_cases.findings import ENGINE
 from verification.numbers import NUMBERS, TIMES
 from verification.table import Table
 
@@ -34,16 +33,10 @@ ROWS_SHOWN = 200
 QUOTED = (
     "claims",
     "figures",
-    "energy-gains",
-    "exact-energy",
+    "energy",
     "proofs",
-    "properties",
-    "scene-ledger",
-    "mechanics",
     "complementarity",
     "hard-cases",
-    "ordinary",
-    "engines",
     "stability",
     "accuracy",
     "haptic-rate",
@@ -181,17 +174,6 @@ def ranked(found: Iterable[Any]) -> list[Any]:
     return sorted(found, key=lambda one: finding.WORST_FIRST.index(one.verdict))
 
 
-def worst_first(cases: Iterable[Finding]) -> list[Finding]:
-    """Return the hard cases: those that the engine fails, then by the number of methods that
-    fail."""
-
-    def rank(case: Finding) -> tuple[bool, int]:
-        failing = [part.name for part in case.parts if part.verdict == finding.REFUTED]
-        return not any(name in ENGINE for name in failing), -len(failing)
-
-    return sorted(cases, key=rank)
-
-
 def badge_words(topic: Finding) -> str:
     """Return the summary of a topic for the first page: how many of its findings fail."""
     failing, total = sum(part.verdict == finding.REFUTED for part in topic.parts), len(topic.parts)
@@ -263,11 +245,10 @@ def _environment() -> Environment:
         counted=counted,
         tables_without=tables_without,
         ranked=ranked,
-        worst_first=worst_first,
         title=lambda name: name[:1].upper() + name[1:],
         **FILTERS,
     )
-    environment.globals |= {"rows_shown": ROWS_SHOWN, "engine": ENGINE}
+    environment.globals |= {"rows_shown": ROWS_SHOWN}
     environment.tests["numeric"] = is_number
     environment.tests["absent"] = is_absent
     return environment

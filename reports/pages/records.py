@@ -1,7 +1,7 @@
 """The plain records from which the report is built. Every field of Evidence may be empty; an empty
 field is printed as "not computed in this run", never as a number.
 
-Findings and proofs come unchanged from the studies; the pages use no other data.
+Findings come unchanged from the studies; the pages use no other data.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from typing import Any
 
 from reports.uses import StoredFile
 from verification.finding import Failure, Finding
-from verification.proofs.show import ProofRecord
 from verification.table import Table
 
 
@@ -33,9 +32,6 @@ class Evidence:
     inputs: Mapping[str, Any] = field(default_factory=dict)
     scenes: Mapping[str, Any] = field(default_factory=dict)  # resolved scenes by name
     claims: tuple[Finding, ...] = ()
-    proofs: tuple[ProofRecord, ...] = ()
-    counterexamples: tuple[Finding, ...] = ()  # laws that a resolver or strategy breaks
-    hard_cases: tuple[Finding, ...] = ()
     effects: Mapping[str, Table] = field(
         default_factory=dict
     )  # of each scene, as `verification.cost.effects` has them

@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 from iapb.run import Run
 from iapb.scene import scene_from_text
 from iapb.simulation import simulate
-from tests.ordinary.scenes import CASES, FLOOR
+from verification.ordinary.scenes import CASES, FLOOR
 
 Values = dict[str, Any]
 

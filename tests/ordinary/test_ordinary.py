@@ -6,14 +6,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from iapb.run import Run
 from iapb.scene import Scene
 from iapb.scene.mechanism import mechanism_of, start_of
 from iapb.scene.model import scene_kind
 from reference.worlds import run_world
-from tests.ordinary.scenes import CASES, Case, Motion
+from verification.ordinary.judge import motion_of
+from verification.ordinary.scenes import CASES, Case, Motion
+from verification.scenes.books import risen
 
 LAWS = {
     "IAPB": [*CASES],
@@ -32,26 +33,11 @@ LAWS = {
 MADE = 1e-4  # of the scene's energy: what the integration of a right run may make
 
 
-def motion_of(run: Run) -> Motion:
-    """Return the motion of a run."""
-    pose, planar = run.pose, run.pose.shape[2] == 3
-    place = np.pad(pose[..., :2], ((0, 0), (0, 0), (0, 1))) if planar else pose[..., :3]
-    turned = (
-        Rotation.from_euler("z", pose[..., 2:].reshape(-1, 1))
-        if planar
-        else Rotation.from_quat(pose[..., 3:].reshape(-1, 4))
-    )
-    return Motion(run.time, place, turned.as_matrix().reshape(*pose.shape[:2], 3, 3))
-
-
 def made_by(run: Run, scene: Scene) -> float:
     """Energy made, by that of the start, of lifting each body by its size, and of the hand's force
     over 0.1 m."""
     q, v = start_of(scene)
-    whole = run.energy["kinetic"] + run.energy["potential"]
-    made = np.max(
-        whole[1:] - whole[0] - run.energy["hand_work"] - run.energy["coupling_work"], initial=0.0
-    )
+    made = np.max(risen(run), initial=0.0)
     moving = 0.5 * v @ mechanism_of(scene).mass_matrix(q) @ v
     weight = np.linalg.norm(scene.gravity or [0.0])
     lifted = sum(

@@ -13,8 +13,8 @@ from iapb import simulate
 from iapb.scene import Scene
 from iapb.scene.reading import scene_from_values
 from reference.mujoco import LEAST_RESTITUTION, MuJoCo, damping_ratio_of, spring_restitution
-from tests.ordinary.scenes import CASES
-from tests.ordinary.test_ordinary import motion_of
+from verification.ordinary.judge import motion_of
+from verification.ordinary.scenes import CASES
 
 pytest.importorskip("mujoco")
 

@@ -135,8 +135,8 @@ def evidence():
         ),
         topics=(
             finding_of(
-                "scene-ledger",
-                "The scenes",
+                "stability",
+                "Walls",
                 "Asked.",
                 "It holds.",
                 (Part("It holds.", REPRODUCED),),

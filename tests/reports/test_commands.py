@@ -162,7 +162,7 @@ REFUSED = [  # status, command line, what the refusal says
     (1, "reproduce --figure fig7", "did you mean fig07?"),
     (1, "reproduce --set contact.friction=0.2", "a figure whose scenes it changes"),
     (1, "reproduce --figure fig04 --set contact.frictoin=0.2", "friction"),
-    (1, "reproduce --figure energy-gains --set contact.friction=0.2", "fig07"),
+    (1, "reproduce --figure what-makes-energy --set contact.friction=0.2", "fig07"),
     (1, "report diff here there", "report = 'here'"),
     (1, "bench --budget 50", "budget = '50': expected a time with its unit, e.g. 50us"),
     (

@@ -140,8 +140,8 @@ def test_whatever_decides_the_records_is_in_the_name_of_their_file(tmp_path, mon
     monkeypatch.setattr(depends, "BESIDE", tmp_path)
     found = [depends.depends_of("complementarity")]
     for text in ("one", "two"):
-        (tmp_path / "problems").mkdir(exist_ok=True)
-        (tmp_path / "problems" / "case.txt").write_text(text)
+        (tmp_path / "robots").mkdir(exist_ok=True)
+        (tmp_path / "robots" / "case.txt").write_text(text)
         found.append(depends.depends_of("complementarity"))
         assert depends.depends_of("complementarity" + topics.AHEAD) == found[-1]
     made = [Stage(tmp_path, "a", int, "quick", one) for one in found]
@@ -258,11 +258,11 @@ def test_a_topic_that_fails_is_named_and_ctrl_c_is_no_failure(tmp_path, monkeypa
     def compute(*_):
         raise raised.pop(0)("the disk went away\nand more")
 
-    monkeypatch.setattr(gather, "plans", lambda: {"mechanics": Plan(Finding, compute)})
-    stage, again = (Stage(tmp_path / "tables", "mechanics", Finding, "quick") for _ in range(2))
+    monkeypatch.setattr(gather, "plans", lambda: {"survival": Plan(Finding, compute)})
+    stage, again = (Stage(tmp_path / "tables", "survival", Finding, "quick") for _ in range(2))
     topic = gather._failed(gather._fill(stage, Runner(tmp_path / "runs"), "quick", nothing))
-    assert topic.key == "mechanics" and [part.verdict for part in topic.parts] == [NOT_COMPUTED]
-    page = build_report(Evidence(topics=(topic,)))["report/complementarity.html"]
+    assert topic.key == "survival" and [part.verdict for part in topic.parts] == [NOT_COMPUTED]
+    page = build_report(Evidence(topics=(topic,)))["report/data.html"]
     assert "Not computed, after RuntimeError: the disk went away." in page
     with pytest.raises(KeyboardInterrupt):
         gather._fill(again, Runner(tmp_path / "runs"), "quick", nothing)

@@ -12,14 +12,14 @@ project's scenes, hyperstatic families, and patches with friction. They are the 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from reference.complementarity.benchmark import SolverRow, performance_profile, run_solvers
+from reference.complementarity.benchmark import SolverRow, run_solvers
 from reference.complementarity.problem import ImpactProblem
 from reference.complementarity.solution import Solution
 from reference.complementarity.solvers import SOLVERS, solver_names
@@ -30,15 +30,12 @@ from verification.complementarity.families import random_cases
 from verification.complementarity.of_runs import scene_impacts
 from verification.cost.problems import patch, pile
 from verification.cost.solvers import LONGEST
-from verification.finding import Failure, attempt, verdict_of_trials
+from verification.finding import Failure, Part, attempt
 from verification.hard_cases import HARD_CASES
 from verification.impacts import Floats
-from verification.table import Row
+from verification.table import Row, Table
 
 VERDICTS = ("solved", "refused", "failed", "missing", "left out")
-FACTORS = np.concatenate(
-    [[1.0], np.geomspace(1.5, 1e5, 60)]
-)  # multiples of the fastest solver's time
 OWN = "own problems"  # name of the collection that `own_problems` makes
 Progress = Callable[[str, int, int], None]
 
@@ -49,13 +46,10 @@ class ProblemStudy(NamedTuple):
     lines : a row for each problem, with a column for each solver, and for each file that cannot be
         read
     rows : one for each solver and problem, as `run_solvers` returns them
-    profile : a row for each kind of problem, solver and factor: the share of the problems that the
-        solver solves within this factor of the fastest solver's time (Dolan and Moré)
     """
 
     lines: tuple[Row, ...]
     rows: tuple[SolverRow, ...]
-    profile: tuple[Row, ...]
 
     @property
     def solvers(self) -> tuple[str, ...]:
@@ -112,33 +106,18 @@ def study_read(
                 or []
             )
     say(stage, pairs, pairs)
-    names, kinds, lines = (
-        dict.fromkeys(row.solver for row in rows),
-        dict[str, list[SolverRow]](),
-        list[Row](),
-    )
+    names = dict.fromkeys(row.solver for row in rows)
+    lines = list[Row]()
     for stored in problems:
         found = [row for row in rows if row.problem == stored.problem.name]
-        kinds.setdefault(
-            "frictionless" if stored.problem.friction is None else "friction", []
-        ).extend(found)
-        line = (
-            attempt(stored.problem.name, partial(_line, stored, found, names), failures)
-            if found
-            else None
-        )
+        made = partial(_line, stored, found, names)
+        line = attempt(stored.problem.name, made, failures) if found else None
         lines += [line] if line else []
     lines += [
         {"problem": file, **dict.fromkeys(names, "not read"), "why not read": reason}
         for file, reason in (unread or {}).items()
     ]
-    profile = [
-        {"kind": kind, "solver": solver, "factor": float(factor), "share solved": float(share)}
-        for kind, found in kinds.items()
-        for solver, shares in performance_profile(found, FACTORS).items()
-        for factor, share in zip(FACTORS, shares, strict=True)
-    ]
-    return ProblemStudy(tuple(lines), tuple(rows), tuple(profile))
+    return ProblemStudy(tuple(lines), tuple(rows))
 
 
 def _line(stored: StoredProblem, rows: list[SolverRow], solvers: Mapping[str, Any]) -> Row:
@@ -183,61 +162,45 @@ def on_problems(study: Study, name: str, folder: Path | None) -> ProblemStudy:
     return study.once(("problems", name), make)
 
 
-def collections(folders: Mapping[str, Path | None]) -> tuple[Check, ...]:
-    """Return a check for each folder by name (None: our own problems), and one with the profiles of
-    all of them."""
-    profile = Check(
-        key="profile",
-        question="",
-        cases=lambda study: folders,
-        timed=["share solved"],
-        digits=3,
-        note="Share of the problems that a solver solves within this factor of the time of the fastest solver.",
-        row=lambda study, name: [
-            {"collection": name, **row} for row in on_problems(study, name, folders[name]).profile
-        ],
-    )
-    return (*(_collection(name, folder) for name, folder in folders.items()), profile)
+def collections(folders: Mapping[str, Path]) -> tuple[Check, ...]:
+    """Return a check for each folder of problem files by name: a row per problem."""
+    return tuple(_collection(name, folder) for name, folder in folders.items())
 
 
-def _collection(name: str, folder: Path | None) -> Check:
+def _collection(name: str, folder: Path) -> Check:
     return Check(
         key=name,
-        question=f"{name[:1].upper()}{name[1:]}: at least one solver solves each problem.",
+        question="Does at least one solver solve each problem?",
         cases=lambda study: on_problems(study, name, folder).lines,
         row=lambda study, line: line,
         holds=lambda row: "solved" in row.values(),
-        rule=verdict_of_trials,
+        targets=_targets,
         timed=["spread of velocities"],
         digits=2,
-        note="Solved: every residual, recomputed from the problem, is at most 1e-6 of the velocity scale. Missing: the "
-        "solver is not installed. Left out: it took too long before. Spread: largest difference "
-        "of the solutions' "
-        "contact velocities, relative to the velocity scale.",
     )
 
 
+def _targets(table: Table) -> Iterator[Part]:
+    yield Part.on("problems that no solver solves", table.holds.count(False), 0)
+
+
 def _solver(study: Study, name: str) -> Row:
-    takes = {
-        "lcp": "no friction",
-        "convex": "no friction, W symmetric semidefinite",
-        "cone": "friction",
-    }
-    entry = SOLVERS[name]
+    """Return how many of our own problems a solver solves."""
+    found = [row.verdict for row in on_problems(study, OWN, None).rows if row.solver == name]
     return {
         "solver": name,
-        "method": entry.method,
-        "package": entry.package,
-        "takes": takes[entry.takes],
+        "method": SOLVERS[name].method,
+        "package": SOLVERS[name].package,
+        "problems": len(found),
+        **{verdict: found.count(verdict) for verdict in VERDICTS},
     }
 
 
-SOLVER_LIST = Check(
+SOLVER_TABLE = Check(
     key="solvers",
-    question="",
-    cases=lambda study: SOLVERS,
+    question="Which solvers solve our own problems, by residuals computed again?",
+    cases=lambda study: on_problems(study, OWN, None).solvers,
     row=_solver,
-    note="Times are of a call from Python.",
 )
 
 

@@ -17,6 +17,7 @@ from iapb.scene import Scene, scene_from_text
 from reference.exact import condition_number, exact_impact, row_condition_number
 from verification.hard_cases.exact_outcomes import FrictionalImpact, exact_poisson
 from verification.impacts import Floats
+from verification.scenes.books import risen, work_given
 
 Exact = NDArray[np.object_] | Floats
 
@@ -238,19 +239,12 @@ def largest_gain(run: Run) -> float:
     coupling also store energy, and this energy is never negative. Therefore a positive gain is
     energy that the simulation has created.
     """
-    ledger = run.energy
-    works = [
-        ledger[name] for name in ("hand_work", "device_hand_work") if name in ledger
-    ]  # at the end of each step
-    kinetic = sum(
-        (ledger[name] for name in ("kinetic", "device_kinetic") if name in ledger),
-        np.zeros(run.steps + 1),
-    )
-    given = sum((np.concatenate([[0.0], work]) for work in works), np.zeros(run.steps + 1))
-    gain = kinetic - kinetic[0] + ledger["potential"] - ledger["potential"][0] - given
-    dropped = float(ledger["potential"][0] - ledger["potential"].min())
-    fed = float(kinetic[0] + np.abs(given).max()) + dropped
-    return float(gain.max()) / max(fed, float(np.finfo(float).tiny))
+    potential, given = run.energy["potential"], work_given(run, device=True)
+    dropped = float(potential[0] - potential.min())
+    kinetic = run.energy["kinetic"][0] + run.energy.get("device_kinetic", [0.0])[0]
+    fed = float(kinetic + np.abs(given).max()) + dropped
+    gain = float(risen(run, device=True).max())
+    return gain / max(fed, float(np.finfo(float).tiny))
 
 
 def smallest_fault(turns: Callable[[float], bool]) -> float:

@@ -13,8 +13,6 @@ and its row says so.
 from __future__ import annotations
 
 import math
-import statistics
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from fractions import Fraction
@@ -60,10 +58,6 @@ METHODS = ("factored", WITHOUT_CLAMP, *COMPARED)
 # contribute a few n ε; 1 + e = 2 doubles them. κ is that of M scaled to a unit diagonal, because
 # rounding acts on each component by itself (van der Sluis 1969).
 _MARGIN = 10.0
-_REPEATS = (
-    5  # number of timed calls after the first one, which fills caches; their median is reported
-)
-_SLOW = 0.2  # [s] a slower call is not repeated
 _HALF_SUBNORMAL = Fraction(
     1, 2**1075
 )  # rounding error of subnormal numbers, which no relative bound covers
@@ -115,7 +109,7 @@ def judge_hard_case(case: AnyCase, method: str, simulate: Simulate = run_in_worl
     "failed", NOT_TRIED or DEPENDS_ON_ROUNDING. The last one is for methods that use LAPACK: their
     residual is within a factor of ten of the tolerance, or their error exceeds half of |v⁻|, so
     another BLAS may change the outcome. The rank is the one that the method used, or the largest of
-    a run's impacts; the time is that of a call or a step.
+    a run's impacts.
     """
     return (
         judge_impact(case, method)
@@ -141,11 +135,8 @@ def _judge_motion(case: TrajectoryCase, world: str, simulate: Simulate) -> Row:
         return not moved.error <= moved.error_bound
 
     fault = smallest_fault(is_seen) if verdict == STABLE else math.nan
-    seconds = (
-        float(np.median(run.chunk_seconds / run.chunk_steps)) if len(run.chunk_steps) else math.nan
-    )
     numbers = found.energy_gain, found.energy_bound, residual, found.error, found.error_bound, fault
-    return _row(world, verdict, numbers, int(run.impacts.rank.max(initial=0)), None, seconds)
+    return _row(world, verdict, numbers, int(run.impacts.rank.max(initial=0)))
 
 
 def _row(
@@ -154,7 +145,6 @@ def _row(
     numbers: Sequence[float] = (math.nan,) * len(_NUMBERS),
     rank: int | None = None,
     exact_rank: int | None = None,
-    seconds: float = math.nan,
     note: str = "",
 ) -> Row:
     known = {
@@ -166,7 +156,6 @@ def _row(
         **known,
         "rank": rank,
         "exact rank": exact_rank,
-        "time [µs]": 1e6 * seconds if math.isfinite(seconds) else None,
         "note": note,
     }
 
@@ -228,12 +217,10 @@ def restitution_residual(run: Run) -> float:
 
 
 class Answer(NamedTuple):
-    """The judged quantities of an impact, v⁺ and rank (None: not known), and the time of the call
-    [s]."""
+    """The judged quantities of an impact: v⁺ and rank (None: not known)."""
 
     velocity: Any
     rank: int | None
-    seconds: float
 
 
 def judge_impact(case: HardCase, method: str) -> Row:
@@ -246,7 +233,7 @@ def judge_impact(case: HardCase, method: str) -> Row:
         note = f"it forms the Delassus matrix; tried on at most {MOST_CONTACTS:,} contacts"
         return _row(method, NOT_TRIED, known, exact_rank=truth.rank, note=note)
     try:
-        answer = _answer(case, method)
+        answer = resolve_once(case, method)
     except IapbError as error:
         return _row(method, _verdict_of(error), known, exact_rank=truth.rank, note=str(error))
 
@@ -277,7 +264,7 @@ def judge_impact(case: HardCase, method: str) -> Row:
             for wrong in faulty_answers(case, answer.velocity)
         )
     numbers = gain, energy_bound, residual, distance, forward_bound, fault
-    return _row(method, verdict, numbers, answer.rank, truth.rank, answer.seconds)
+    return _row(method, verdict, numbers, answer.rank, truth.rank)
 
 
 def allowed_error(case: HardCase) -> float:
@@ -301,22 +288,11 @@ def faulty_answers(case: HardCase, v_plus: Floats) -> list[Floats]:
     return ([change] if change.any() else []) + ([] if stopped else [v_plus])
 
 
-def _answer(case: HardCase, method: str) -> Answer:
-    """Return an answer with the median time of a few calls."""
-    first = resolve_once(case, method)
-    if first.seconds >= _SLOW:
-        return first
-    return first._replace(
-        seconds=statistics.median(resolve_once(case, method).seconds for _ in range(_REPEATS))
-    )
-
-
 def resolve_once(case: HardCase, method: str) -> Answer:
-    """Resolve and time one impact; with friction by the engine's law, or by Newton's and Coulomb's
+    """Resolve one impact; with friction by the engine's law, or by Newton's and Coulomb's
     laws alone."""
     given = case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution
-    rank: int | None
-    started, rank = time.perf_counter(), None
+    rank: int | None = None
     if isinstance(case, FrictionalCase) and method == NEWTON_COULOMB:
         velocity, rank = np.array([float(x) for x in case.impact.velocity(1)]), 1
     elif isinstance(case, FrictionalCase):
@@ -329,10 +305,9 @@ def resolve_once(case: HardCase, method: str) -> Answer:
     else:
         impact = resolve_impact(*given, clamp=None if method == "factored" else False)
         velocity, rank = impact.velocity, impact.rank
-    seconds = time.perf_counter() - started
     if method in COMPARED and not np.isfinite(velocity).all():
         raise RangeError("velocity", f"{method} works on the numbers as given")
-    return Answer(velocity, rank, seconds)
+    return Answer(velocity, rank)
 
 
 def _unmet(case: HardCase, v_plus: Floats) -> float:

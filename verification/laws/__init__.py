@@ -13,8 +13,6 @@ from iapb.lazy import lazy_names
 if TYPE_CHECKING:
     from verification.impacts import ImpactCase as ImpactCase
     from verification.laws.bounds import LawResidual as LawResidual
-    from verification.laws.bulk import BulkImpacts as BulkImpacts
-    from verification.laws.bulk import bulk_impacts as bulk_impacts
     from verification.laws.contracts import CONTRACTS as CONTRACTS
     from verification.laws.contracts import EXACT_LAWS as EXACT_LAWS
     from verification.laws.contracts import FRICTIONAL_LAWS as FRICTIONAL_LAWS
@@ -29,8 +27,6 @@ if TYPE_CHECKING:
 _HOME = {
     "ImpactCase": "verification.impacts",
     "LawResidual": "verification.laws.bounds",
-    "BulkImpacts": "verification.laws.bulk",
-    "bulk_impacts": "verification.laws.bulk",
     "CONTRACTS": "verification.laws.contracts",
     "EXACT_LAWS": "verification.laws.contracts",
     "FRICTIONAL_LAWS": "verification.laws.contracts",

@@ -19,6 +19,7 @@ from iapb.worlds import find_world
 from verification.laws.bounds import Found, Law, LawCount, law
 from verification.laws.scenes import ROOM, Values, draw_scene, draw_spatial_scene
 from verification.laws.trajectories import Trajectory, judge_run, norm
+from verification.scenes.books import risen, work_given
 
 STATE_LAWS: dict[str, Law] = {}
 # What an integration over the drawn steps may make, and by how much a step's mean velocity may
@@ -51,10 +52,8 @@ def energy_is_not_made(trajectory: Trajectory) -> Found:
     if run.coupling == "unilateral" or "potential" not in run.energy:
         return None
     kinetic, potential = run.energy["kinetic"], run.energy["potential"]
-    work = run.energy["hand_work"] + run.energy.get("coupling_work", 0.0)
-    rise = kinetic[1:] + potential[1:] - kinetic[0] - potential[0] - work
-    size = float(np.max(kinetic) + np.ptp(potential) + np.max(np.abs(work)))
-    return (float(np.max(rise)) / size, CLOSE) if size > 0.0 else None
+    size = float(np.max(kinetic) + np.ptp(potential) + np.max(np.abs(work_given(run))))
+    return (float(np.max(risen(run)[1:])) / size, CLOSE) if size > 0.0 else None
 
 
 @law(STATE_LAWS, "overlap", "no body passes into another or into a wall")

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from reference import Floats
 from reference.random_mechanisms import random_mechanism, random_state
 from verification.check import Check, Study
-from verification.table import Row
+from verification.finding import Part
+from verification.table import Row, Table
 
 SIZES = (1, 3, 10, 30)  # joints
 MATRICES = {"quick": 150, "full": 2000}
@@ -47,13 +50,16 @@ def _definite(study: Study, joints: int) -> Row:
     }
 
 
+def _targets(table: Table) -> Iterator[Part]:
+    wrong = table.holds.count(False)
+    yield Part.on("sizes of trees with a mass matrix that is not positive definite", wrong, 0)
+
+
 POSITIVE_DEFINITE = Check(
     key="positive definite",
-    question="The mass matrix is positive definite wherever rounding permits a judgement.",
+    question="Is the mass matrix positive definite wherever rounding permits a judgement?",
     cases=lambda _: SIZES,
     row=_definite,
-    spans=("largest condition judged", "least eigenvalue × condition"),
+    targets=_targets,
     holds=lambda row: bool(row["least eigenvalue × condition"] > 0.0),
-    note="Condition and eigenvalue are those of M scaled to a unit diagonal. A row holds if all judged eigenvalues are "
-    f"positive. Above a condition of {LARGEST_CONDITION:g} rounding decides the sign, so the matrix is not judged.",
 )

@@ -15,22 +15,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from verification.finding import (
-    NOT_TESTABLE,
-    REFUTED,
-    REPRODUCED,
-    Failure,
-    Finding,
-    Part,
-    counted,
-    finding_of,
-    of_each,
-)
+from verification.finding import Failure, Finding, Part, counted, finding_of, of_each
+from verification.numbers import Values, value_tables
 from verification.proofs import layout
 from verification.proofs.coq.checked import Development
 from verification.proofs.prove import checked
 from verification.proofs.show import NO, NOT_APPLICABLE, YES, ProofRecord
-from verification.table import titled
+from verification.table import table_from
 
 
 def all_proofs() -> tuple[str, ...]:
@@ -56,84 +47,76 @@ def check_all(
     return tuple(of_each(counted(all_proofs(), progress), lambda name: [check(name)], failures))
 
 
+# files of the statements -> their group on the page
+GROUPS = {
+    "theorems": "the paper",
+    "redundant_rows": "the paper",
+    "consequences": "the paper",
+    "exact_instances": "the paper",
+    "errata": "errata of the paper",
+    "floating_point": "floating point",
+}
+OTHER_GROUP = "our engine and its laws"
+
+
 def on_proofs(
     records: Sequence[ProofRecord], failures: Sequence[Failure] = (), *, development: Development
 ) -> Finding:
     """Return the Finding on proofs: proved statements, checking tools, refuted false variants, and
     Coq's theorems."""
+    groups = {
+        name: GROUPS.get(file, OTHER_GROUP)
+        for file in layout.FILES
+        for name in layout.names_in(file)
+    }
     in_coq = development.statements
-    table = titled(
-        ("statement", "holds", "own kernel", "SymPy", "Coq", "wrong twins"),
-        [
-            (
-                one.name,
-                one.holds,
-                YES if all(step.accepted for step in one.steps) else NO,
-                one.sympy,
-                in_coq[one.name].coq if one.name in in_coq else NOT_APPLICABLE,
-                len(one.twins),
-            )
-            for one in records
-        ],
+    statements = table_from(
+        {
+            "statement": one.name,
+            "group": groups.get(one.name, OTHER_GROUP),
+            "title": one.title,
+            "says": one.statement,
+            "source": one.source,
+            "holds": one.holds,
+            "own kernel": YES if all(step.accepted for step in one.steps) else NO,
+            "SymPy": one.sympy,
+            "Coq": in_coq[one.name].coq if one.name in in_coq else NOT_APPLICABLE,
+            "false variants": len(one.twins),
+        }
+        for one in records
     )
-    proved, twins = sum(table.column("holds")), sum(table.column("wrong twins"))
-    confirmed = sum(one.sympy == YES for one in records)
-    sentence = (
-        f"{proved} of {len(records)} statements about the formulas are proved: a program checks "
-        f"every step. SymPy confirms {'all ' * (confirmed == proved)}{confirmed}. To test the "
-        f"program, we also wrote {twins} false variants; it refutes each by an exact "
-        f"counterexample."
+    theorems = table_from(
+        {
+            "theorem": one.name,
+            "says": one.says,
+            "accepted": one.holds,
+            "Coq": one.coq,
+            "assumes": ", ".join(one.axioms or ()),
+        }
+        for one in development.about_code
     )
-    part = Part(sentence, REPRODUCED if proved == len(records) else REFUTED)
-    about_code = titled(
-        ("theorem", "says", "holds", "own kernel", "SymPy", "Coq", "assumes"),
-        [
-            (
-                one.name,
-                one.says,
-                one.holds,
-                NOT_APPLICABLE,
-                NOT_APPLICABLE,
-                one.coq,
-                ", ".join(one.axioms or ()),
-            )
-            for one in development.about_code
-        ],
-    )
-    by_coq = _by_coq(development)
+    tables = {"statements": statements, "theorems about the code": theorems}
+    proved = sum(one.holds for one in records)
+    accepted = [one.holds is True for one in development.about_code]
+    numbers: Values = {
+        "statements": len(records),
+        "proved": proved,
+        "by_sympy": sum(one.sympy == YES for one in records),
+        "false_variants": sum(len(one.twins) for one in records),
+        "theorems": len(accepted),
+        "coq": development.version or None,
+        "theorems_by_coq": sum(accepted) if development.version else None,
+        "statements_by_coq": len(in_coq) if development.version else None,
+    }
+    parts = [Part.on("statements that are not proved", len(records) - proved, 0)]
+    if development.version:
+        parts.append(Part.on("theorems that Coq does not accept", accepted.count(False), 0))
     return finding_of(
         "proofs",
         "Proofs",
         "Which statements are proved?",
-        f"{sentence} {by_coq.sentence}",
-        (part, by_coq),
-        {"statements": table, "theorems about the code": about_code},
+        "",
+        parts,
+        tables | value_tables(numbers),
         failures,
     )
-
-
-def _by_coq(development: Development) -> Part:
-    """Return what Coq proves, or that it has not run."""
-    theorems = development.about_code
-    if not development.version:
-        return Part(
-            f"Another {len(theorems)} theorems, about the code, need Coq, which has not run here "
-            "(`make -C verification/proofs/coq`).",
-            NOT_TESTABLE,
-            optional=True,
-        )
-    accepted = sum(one.holds is True for one in theorems)
-    sentence = (
-        f"Coq {development.version} proves {len(development.statements)} of the statements too, "
-        f"and {accepted} "
-        f"of {len(theorems)} theorems about code: a checker of impacts in exact integers, and the "
-        f"last step of "
-        "the engine's impact in floating point. Axioms: those of the real numbers, and classical "
-        "logic, which "
-        "Coq's library for floating point, Flocq, uses. Not proved in Coq: that the compiled code "
-        "does the "
-        "theorems' operations in their order, and that the C functions frexp and ldexp, which "
-        "scale by powers "
-        "of two, are exact."
-    )
-    return Part(sentence, REPRODUCED if accepted == len(theorems) else REFUTED)

@@ -121,6 +121,11 @@ def all_names() -> tuple[str, ...]:
     return tuple(name for file in FILES for name in _texts(file))
 
 
+def names_in(file: str) -> tuple[str, ...]:
+    """Return the names of the statements of a file."""
+    return tuple(_texts(file))
+
+
 def block(name: str) -> Block:
     """Return the statement of this name as text; ArgumentError if there is none."""
     return read(name, text_of(name))

@@ -1,5 +1,4 @@
-"""Checked proofs as plain records, and formulas and proofs as text and as LaTeX that latex2mathml
-can convert."""
+"""Checked proofs as plain records and as text."""
 
 from __future__ import annotations
 
@@ -21,11 +20,6 @@ class Line:
 
     words: str
     text: str = ""
-
-    @property
-    def latex(self) -> str:
-        """The formula in LaTeX; empty if it holds words."""
-        return "" if "exact rational" in self.text else latex(self.text)
 
 
 @dataclass(frozen=True)
@@ -160,26 +154,6 @@ _SYMBOLS = {
     r"\Phi": "Φ",
     r"\Lambda": "Λ",
 }
-_GREEK = {
-    mark: latex
-    for latex, mark in _SYMBOLS.items()
-    if mark.isalpha() and not mark.isascii() and mark != "Σ"
-}
-_RAISED = {"⁻¹": "-1", "⁺": "+", "⁻": "-", "†": r"\dagger"}
-_LOWERED = dict(zip("₀₁₂₃₄₅₆₇₈₉ₙₑₕₖₜₛᵣᵢ", "0123456789nehktsri", strict=True))
-_MARKS = {"ᵀ": r"\top", "²": "2", "³": "3", "⁴": "4"}
-_OPERATORS = {
-    "+": "+",
-    "−": "-",
-    "=": "=",
-    "≠": r"\neq",
-    "<": "<",
-    "≤": r"\leq",
-    ">": ">",
-    "≥": r"\geq",
-    "⪰": r"\succeq",
-    "≻": r"\succ",
-}
 _LONG = 60  # characters of a rational that is still written out
 
 
@@ -192,36 +166,6 @@ def plain(prose: str) -> str:
     for mark in sorted(_SYMBOLS, key=len, reverse=True):
         prose = prose.replace(mark, _SYMBOLS[mark])
     return re.sub(r"\\?[\${}]", "", prose)
-
-
-def latex(formula: str) -> str:
-    """Return the LaTeX form of a printed formula, or of a value such as M = [1 0; 0 1]."""
-    if value := re.fullmatch(r"(\S+) = \[([^\[\]]*)\]", formula):
-        body = r" \\ ".join(
-            " & ".join(map(_latex_part, row.split())) for row in value[2].split("; ")
-        )
-        return f"{_latex_part(value[1])} = \\begin{{pmatrix}} {body} \\end{{pmatrix}}"
-    pieces: list[str] = []
-    for chunk in formula.replace(" · ", " ").split():
-        if chunk in _OPERATORS:
-            pieces += ["", _OPERATORS[chunk], ""]
-        else:
-            pieces += [r"\," if pieces and pieces[-1] else "", _latex_part(chunk)]
-    return " ".join(piece for piece in pieces if piece)
-
-
-def _latex_part(chunk: str) -> str:
-    """Return one number or name in LaTeX, such as −1/2, M⁻¹ᵀ or γ⁺, with the brackets around it."""
-    found = re.fullmatch(r"([(\[−-]*)(.*?)([ᵀ²³⁴]?)([)\]]*)", chunk)
-    opening, name, mark, closing = found.groups()  # type: ignore[union-attr]
-    upper = "".join(_RAISED[each] for each in re.findall("|".join(_RAISED), name))
-    name = re.sub(r"(\d+)/(\d+)", r"\\frac{\1}{\2}", re.sub("|".join(_RAISED), "", name))
-    lower = "".join(_LOWERED.get(each, "") for each in name)
-    base = "".join(_GREEK.get(each, each) for each in name if each not in _LOWERED)
-    base += (f"_{{{lower}}}" if lower else "") + (f"^{{{upper}}}" if upper else "")
-    return (
-        opening.replace("−", "-") + (f"{{{base}}}^{{{_MARKS[mark]}}}" if mark else base) + closing
-    )
 
 
 def fact_line(fact: Fact) -> Line:

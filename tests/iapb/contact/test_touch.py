@@ -7,100 +7,33 @@ import math
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from iapb.contact.laws import ImpulseAugmented
 from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling
 from iapb.run import Run
-from iapb.scene import scene_from_text
+from iapb.scene import Scene, scene_from_text
+from iapb.scene.reading import scene_from_values
 from iapb.simulation import Simulation, simulate
 from verification.certificate import certify
+from verification.ordinary.touch import INERTIA, G, heights, toss, tossed
 
-G = 9.81
-WIDTH = 0.1
-HEIGHT = 0.06
-CORNERS = 0.5 * np.array([[WIDTH, HEIGHT], [-WIDTH, HEIGHT], [-WIDTH, -HEIGHT], [WIDTH, -HEIGHT]])
-INERTIA = (WIDTH**2 + HEIGHT**2) / 12.0
 # Some ten impacts multiply the rounding of a touch (1e-15 m) by ten each at worst.
 EXACT = 1e-8
 
 FLOOR = "walls: [{name: floor, kind: half_plane, point: [0, 0], normal: [0, 1]}]"
 
 
-def toss_text(
-    state: NDArray[np.float64], rate: float, friction: float = 0.0, seconds: float = 0.4
-) -> str:
-    x, y, angle, vx, vy, spin = state.tolist()
-    return f"""name: toss
-rate: {rate}
-duration: {seconds}
-gravity: [0, -{G}]
-contact: {{restitution: 0.6, friction: {friction}}}
-bodies:
-  - {{name: box, joint: planar, mass: 1, inertia: {INERTIA!r},
-     position: [{x!r}, {y!r}, {angle!r}], velocity: [{vx!r}, {vy!r}, {spin!r}],
-     shapes: [{{kind: box, size: [{WIDTH}, {HEIGHT}]}}]}}
-{FLOOR}
-"""
-
-
-def heights(q: NDArray[np.float64], v: NDArray[np.float64], t: float) -> NDArray[np.float64]:
-    """Return the heights of the four corners after t seconds of flight."""
-    y = q[1] + t * v[1] - 0.5 * G * t * t
-    angle = q[2] + t * v[2]
-    return np.asarray(y + math.sin(angle) * CORNERS[:, 0] + math.cos(angle) * CORNERS[:, 1])
-
-
-def tossed(
-    state: NDArray[np.float64], restitution: float, friction: float, seconds: float
-) -> tuple[NDArray[np.float64], int]:
-    """Return where the box is in the end, and the number of its impacts: parabolas between touches
-    that a root finder finds."""
-    q = state[:3].copy()
-    v = state[3:].copy()
-    left = seconds
-    impacts = 0
-    while True:
-        times = np.linspace(0.0, left, 4000)
-        low = np.array([heights(q, v, t) for t in times]) < 0.0
-        falls = [
-            (k, i) for k, i in np.argwhere(low[1:] & ~low[:-1]).tolist() if times[k + 1] > 1e-9
-        ]
-        touches = [
-            (brentq(lambda t: heights(q, v, t)[i], times[k] or 1e-9, times[k + 1], xtol=1e-16), i)  # noqa: B023
-            for k, i in falls[:4]
-        ]
-        t, corner = min(touches, default=(left, -1))
-        q = q + t * v - [0.0, 0.5 * G * t * t, 0.0]
-        v = v - [0.0, G * t, 0.0]
-        left -= t
-        if corner < 0:
-            return q, impacts
-        impacts += 1
-        c = math.cos(q[2])
-        s = math.sin(q[2])
-        row = np.array([0.0, 1.0, c * CORNERS[corner, 0] - s * CORNERS[corner, 1]])
-        along = np.array([1.0, 0.0, -s * CORNERS[corner, 0] - c * CORNERS[corner, 1]])
-        v = v + coulomb(np.stack([row, along]), v, restitution, friction)
-
-
-def coulomb(
-    rows: NDArray[np.float64], v: NDArray[np.float64], restitution: float, friction: float
-) -> NDArray[np.float64]:
-    """Return the change of v by one impact with Coulomb's law: it sticks, or slides one way."""
-    moved = rows / [1.0, 1.0, INERTIA]
-    inverse = rows @ moved.T
-    before = rows @ v
-    due = -np.array([(1.0 + restitution) * before[0], before[1]])
-    normal, side = np.linalg.solve(inverse, due)
-    if abs(side) <= friction * normal:
-        return np.asarray(moved.T @ [normal, side])
-    for sign in (-1.0, 1.0):
-        impulse = np.array([1.0, sign * friction])
-        impulse *= due[0] / (inverse[0] @ impulse)
-        if impulse[0] >= 0.0 and sign * (before + inverse @ impulse)[1] <= 0.0:
-            return np.asarray(moved.T @ impulse)
-    raise AssertionError("Coulomb's law has no solution")
+def toss_scene(
+    state: NDArray[np.float64],
+    rate: float,
+    friction: float = 0.0,
+    rule: str = "touch",
+    restitution: float = 0.6,
+    seconds: float = 0.4,
+) -> Scene:
+    values = toss(state, restitution, friction, 0.01).scene
+    contact = values["contact"] | {"impact_time": rule}
+    return scene_from_values(values | {"rate": rate, "duration": seconds, "contact": contact})
 
 
 def states(count: int, seed: int) -> list[NDArray[np.float64]]:
@@ -115,7 +48,7 @@ def states(count: int, seed: int) -> list[NDArray[np.float64]]:
 def test_a_tossed_box_lands_where_it_should(rate: float, friction: float) -> None:
     for state in states(4, seed=2):
         truth, impacts = tossed(state, 0.6, friction, 0.4)
-        run = simulate(scene_from_text(toss_text(state, rate, friction)))
+        run = simulate(toss_scene(state, rate, friction))
         assert np.abs(run.q[-1] - truth).max() < EXACT
         assert len(run.impacts.step) == impacts
 
@@ -123,9 +56,9 @@ def test_a_tossed_box_lands_where_it_should(rate: float, friction: float) -> Non
 def test_impacts_at_steps_miss_it_by_far() -> None:
     """The test above can fail: with impacts at the start of a step it does."""
     state = states(4, seed=2)[0]
-    text = toss_text(state, 1000.0).replace("{rest", "{impact_time: step, rest")
+    scene = toss_scene(state, 1000.0, rule="step")
     truth, _ = tossed(state, 0.6, 0.0, 0.4)
-    assert np.abs(simulate(scene_from_text(text)).q[-1] - truth).max() > 1e3 * EXACT
+    assert np.abs(simulate(scene).q[-1] - truth).max() > 1e3 * EXACT
 
 
 @pytest.mark.parametrize("rate", [250.0, 1000.0])
@@ -136,10 +69,7 @@ def test_a_box_that_tips_over_one_corner_lands_on_the_other_where_that_touches(
     """The two bodies are in contact all the time; the second corner still strikes at gap zero."""
     state = np.array([0.0, 0.0, tilt, 0.0, 0.0, 0.0])
     state[1] = -heights(state[:3], state[3:], 0.0).min()
-    text = toss_text(state, rate, friction=1.0, seconds=0.3).replace(
-        "restitution: 0.6", "restitution: 0"
-    )
-    run = simulate(scene_from_text(text))
+    run = simulate(toss_scene(state, rate, friction=1.0, restitution=0.0, seconds=0.3))
     lands = 3 if tilt > 0.0 else 2
     above = np.array([heights(q, np.zeros(3), 0.0)[lands] for q in run.impacts.q])
     assert abs(above[above < 2e-3][0]) < EXACT
@@ -172,8 +102,7 @@ def test_elastic_bounces_keep_their_height() -> None:
 def test_corners_of_a_fast_spin_touch_without_overlap() -> None:
     """Seen from an overlap, Newton's method may look before the touch; it comes back from the gap."""
     start = np.array([0.0, 0.4, 0.7, 0.3, 0.0, 3.0])
-    text = toss_text(start, 1000.0, seconds=3.0).replace("restitution: 0.6", "restitution: 1")
-    run = simulate(scene_from_text(text))
+    run = simulate(toss_scene(start, 1000.0, restitution=1.0, seconds=3.0))
     energy = 0.5 * (run.v**2 @ np.array([1.0, 1.0, INERTIA])) + G * run.q[:, 1]
     touches = [heights(q, np.zeros(3), 0.0).min() for q in run.impacts.q]
     assert len(touches) > 8
@@ -186,9 +115,9 @@ def test_the_certificate_judges_a_constant_mass_matrix_as_the_engine_has_it() ->
     """Turned, the inertia of this box rounds to another double, and 1 of 30 impacts would gain."""
     mass, inertia = 0.9608369981557852, 0.0008835501300641513
     start = np.array([-0.18, 0.157, 0.746, 0.682, 0.589, 3.46])
-    text = toss_text(start, 1000.0, seconds=4.0).replace("restitution: 0.6", "restitution: 1")
-    text = text.replace(f"mass: 1, inertia: {INERTIA!r}", f"mass: {mass}, inertia: {inertia}")
-    run = simulate(scene_from_text(text))
+    scene = toss_scene(start, 1000.0, restitution=1.0, seconds=4.0)
+    changed = {"bodies.box.mass": mass, "bodies.box.inertia": inertia}
+    run = simulate(scene.with_values(changed))
     found = certify(run)
     assert found.impacts > 10
     assert found.gains == 0
@@ -224,9 +153,9 @@ def test_another_group_keeps_its_bits() -> None:
 
 
 def test_single_steps_give_the_bits_of_one_run() -> None:
-    text = toss_text(states(1, seed=5)[0], 500.0)
-    run = simulate(scene_from_text(text))
-    simulation = Simulation(scene_from_text(text))
+    scene = toss_scene(states(1, seed=5)[0], 500.0)
+    run = simulate(scene)
+    simulation = Simulation(scene)
     for k in range(run.steps):
         result = simulation.step()
         assert (result.q == run.q[k + 1]).all() and (result.v == run.v[k + 1]).all()

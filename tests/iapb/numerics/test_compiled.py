@@ -78,7 +78,7 @@ from iapb.advice.checks import check_scene
 from iapb.contact.impact import resolve_frictional_impact, resolve_impact, resolve_impacts
 from iapb.scene import scene_names
 from iapb.system import coupling_of
-from verification.laws.bulk import exact_energy
+from verification.laws.bulk import judged_impacts
 
 for name in scene_names():
     scene = load_scene(find_scene(name))
@@ -92,7 +92,7 @@ resolve_impact(matrix.T, [[1, 0]], v[::-1], [0.5])
 resolve_impact(matrix, matrix, v, [0.5, 0.25])
 resolve_impacts(matrix[None], matrix[None], v[None], 0.5)
 resolve_frictional_impact(matrix, matrix[:1], matrix[1:], v, 0.5, 0.1)
-exact_energy("light direction", 20)
+judged_impacts("light directions", 20)
 print(sorted(as_python))
 """
 

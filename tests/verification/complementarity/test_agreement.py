@@ -4,7 +4,7 @@ faulty resolver."""
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,12 +15,12 @@ from hypothesis import strategies as st
 from iapb.errors import IapbError
 from iapb.scene import find_scene, load_scene
 from reference.worlds import run_world
-from tests.reference.fclib_files import local_file
 from verification.check import Study
 from verification.complementarity import agreement as study
 from verification.complementarity.families import FAMILIES, random_cases, two_contacts
+from verification.complementarity.landings import LANDINGS
 from verification.complementarity.of_runs import impacts_of_run
-from verification.complementarity.piles import groups_of, piles, recorded_piles
+from verification.complementarity.piles import PILES
 from verification.finding import REFUTED, REPRODUCED
 from verification.impacts import ImpactCase
 
@@ -40,7 +40,10 @@ def test_the_laws_agree_if_and_only_if_some_pushing_impulse_gives_the_motion() -
 
 def test_restitution_scales_the_distance_and_moves_no_border() -> None:
     """The same impacts with e = 0 and e = 1: twice the distance."""
-    by_e = {e: [c for c in FOUND if c["e"] == e] for e in (0.0, 1.0)}
+    by_e = {
+        e: [c for case, c in zip(CASES, FOUND, strict=True) if case.restitution == e]
+        for e in (0.0, 1.0)
+    }
     for plastic, elastic in zip(by_e[0.0], by_e[1.0], strict=True):
         assert elastic["distance"] == pytest.approx(2.0 * plastic["distance"], rel=1e-9, abs=1e-12)
 
@@ -65,74 +68,53 @@ def test_two_contacts_agree_exactly_where_the_speed_ratio_exceeds_the_cosine(
 
 
 def test_the_map_counts_all_cases_and_one_exception_refutes_it() -> None:
-    rows = list(study.map_rows(FOUND))
-    assert sum(row["cases"] for row in rows) == len(FOUND)
     assert len(FOUND) == 6 * 3 * sum(len(redundancies) for _, redundancies in FAMILIES.values())
-    statements, touching = study.MAP.sentences(study.MAP.table_of(rows))
-    assert statements.verdict == REPRODUCED and touching.name == "touching"
-    for name, wrong in (
-        ("contradictions", 1),
-        ("defect", 10 * study.PUSHED),
-        ("momentum outside range(Jᵀ)", 1e-3),
-    ):
-        assert (
-            study.MAP.sentences(study.MAP.table_of([{**rows[0], name: wrong}, *rows[1:]]))[
-                0
-            ].verdict
-            == REFUTED
-        )
+    row = study.map_row("one contact", FOUND)
+    assert row["cases"] == len(FOUND) == row["agree"] + row["differ"]
+    (told,) = study.MAP.sentences(study.MAP.table_of([row]))
+    assert told.verdict == REPRODUCED
+    wrong = study.MAP.table_of([row, row | {"contradictions": 1}])
+    assert study.MAP.sentences(wrong)[0].verdict == REFUTED
+    for key in ("defect", "momentum outside range(Jᵀ)"):
+        assert study.MAP.table_of([row | {key: 1e-3}]).passed is False
 
 
 def test_a_resolver_that_clips_its_impulses_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
     """Clipping negative impulses one by one is neither IAPB nor the LCP."""
+    original = study.resolve_impact
 
-    def clipped(case: ImpactCase, iapb: Any = study.iapb) -> tuple[np.ndarray, np.ndarray]:
-        p = np.maximum(iapb(case)[1], 0.0)
-        return case.velocity + np.linalg.solve(case.mass_matrix, case.contact_jacobian.T @ p), p
+    def clipped(M: Any, J: Any, v: Any, e: Any) -> Any:
+        p = np.maximum(original(M, J, v, e).impulses, 0.0)
+        return SimpleNamespace(velocity=v + np.linalg.solve(M, J.T @ p))
 
-    monkeypatch.setattr(study, "iapb", clipped)
+    monkeypatch.setattr(study, "resolve_impact", clipped)
     found = study.compare_cases(
-        case for case, c in zip(CASES, FOUND, strict=True) if c["adhesion"] == "adhesive"
+        case for case, c in zip(CASES, FOUND, strict=True) if not c["pushes"]
     )
-    assert any(c["distance"] > study.SAME and c["adhesion"] == "none" for c in found)
     assert max(c["defect"] for c in found) > 1e-3
 
 
 def test_piles_agree_only_where_they_are_small_and_pushing_is_the_lcp() -> None:
-    check, groups = piles(()), list(groups_of("quick", ()))
-    assert len(groups) == 15 and len(groups[0][1]) == 16
-    table = check.table(
-        Study(), [(name, found[:3]) for name, found in groups if name.startswith(("4 ", "16 "))]
-    )
-    small, large = (
-        [row for row in table.records() if row["pile"].startswith(f"{n} spheres")] for n in (4, 16)
-    )
-    assert any(row["share that agrees"] for row in small) and not any(
-        row["share that agrees"] for row in large
-    )
-    assert (
-        not any(table.column("contradicted by least squares"))
-        and max(table.column("largest change of KE")) <= 0.0
-    )
-    assert max(table.column("pushing from the LCP")) <= 1e-12
-    assert all(row["share of impulses that pull"] > 0.0 for row in large) and any(
-        row["redundant"] for row in large
-    )
-    (said,) = check.sentences(table)
-    limit = max(table.column("most contacts that agree"))
-    assert said.verdict == REFUTED and f"more than {limit} contacts" in said.miss
+    table = PILES.table(Study(), [4, 16])
+    small, large = table.records()
+    assert small["piles"] == 48 and large["piles"] == 12
+    assert small["agree"] > 0 == large["agree"]
+    assert large["share of impulses that pull"] > 0.0
+    assert PILES.sentences(table)[0].verdict == REPRODUCED
+    wrong = PILES.table_of([table.by_title()[0] | {"pushing only, from the LCP": 1e-3}])
+    assert PILES.sentences(wrong)[0].verdict == REFUTED
 
 
-def test_recorded_piles_are_their_normal_rows(tmp_path: Path) -> None:
-    rows = np.random.default_rng(0).normal(size=(60, 12))
-    local_file(tmp_path / "pile.hdf5", rows @ rows.T, rows @ np.ones(12), np.full(20, 0.4))
-    (tmp_path / "broken.lcp").write_text("3 1 2")
-    (case,) = recorded_piles(tmp_path, 100)
-    assert case.contacts == 20 and case.family == "recorded: pile.hdf5"
-    normals = case.contact_jacobian
-    assert normals @ normals.T == pytest.approx((rows @ rows.T)[::3, ::3])
-    assert normals @ case.velocity == pytest.approx((rows @ np.ones(12))[::3])
-    assert not list(recorded_piles(tmp_path, 19))
+def test_a_bar_on_two_posts_pushes_and_pulls_as_the_condition_says() -> None:
+    rows = {row["impact"]: row for row in LANDINGS.table(Study()).records()}
+    for name, pulls in (("A", False), ("B", True)):
+        row = rows[name]
+        left, right = (row[f"impulse at the {side}"] for side in ("left", "right"))
+        assert (right < 0.0) == pulls == (row["r"] < row["c"])
+        assert left + right == pytest.approx(0.625)  # the momentum of the bar
+    lifted = rows["B"]["right contact after pushing only"]
+    assert lifted == pytest.approx(rows["B"]["c"] - rows["B"]["r"])
+    assert rows["peg_corner"]["c"] == pytest.approx(0.9155, abs=1e-4)
 
 
 def test_a_run_that_does_not_belong_to_its_scene_is_refused() -> None:

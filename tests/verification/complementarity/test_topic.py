@@ -15,12 +15,11 @@ from verification.check import Study
 from verification.complementarity import extensions
 from verification.complementarity.extensions import FRICTION, UNEQUAL
 from verification.complementarity.of_runs import scene_impacts
-from verification.complementarity.solvers import FACTORS, SCENES, collections, study_read
-from verification.complementarity.topic import REFERENCES
+from verification.complementarity.solvers import SCENES, collections, study_read
 from verification.cost import solvers as timings
 from verification.cost.calls import PRINTED
 from verification.cost.solvers import DAQP, IAPB, IMPACT_TIMES, KERNEL, LEMKE_KERNEL, Size
-from verification.finding import MIXED, NOT_TESTABLE, REFUTED, REPRODUCED
+from verification.finding import REFUTED
 
 
 def test_friction_is_coulombs_law_where_all_push_and_never_gains(
@@ -33,8 +32,8 @@ def test_friction_is_coulombs_law_where_all_push_and_never_gains(
     assert all(row["NCP gains"] == 0 for row in plastic)
     assert any(row["NCP gains"] > 0 and row["friction reduced"] > 0 for row in elastic)
     for wrong in ({"share equal to the NCP": -1}, {"largest change of KE, IAPB": 1e-9}):
-        assert FRICTION.sentences(FRICTION.table_of([plastic[0] | wrong]))[0].verdict == REFUTED
-    assert FRICTION.sentences(FRICTION.table_of(()))[0].verdict == NOT_TESTABLE
+        said = FRICTION.sentences(FRICTION.table_of([plastic[0] | wrong]))
+        assert [part.verdict for part in said].count(REFUTED) == 1
 
 
 def test_unequal_restitution_is_poissons_law_and_never_gains() -> None:
@@ -49,13 +48,6 @@ def test_unequal_restitution_is_poissons_law_and_never_gains() -> None:
 @pytest.mark.parametrize("name", SCENES)
 def test_each_scene_of_our_own_problems_has_an_impact_without_friction(name: str) -> None:
     assert scene_impacts(name)
-
-
-def test_the_references_are_compared_scene_by_scene() -> None:
-    table = REFERENCES.table(Study(), ["peg_corner"])
-    assert table.passed and REFERENCES.sentences(table)[0].verdict == REPRODUCED
-    wrong = REFERENCES.table_of([table.by_title()[0] | {"gap [m]": 1e-9}])
-    assert wrong.passed is False and REFERENCES.sentences(wrong)[0].verdict == REFUTED
 
 
 def test_every_way_is_timed_on_every_size_and_gives_the_same_motion(
@@ -101,7 +93,7 @@ def test_a_folder_of_problems(tmp_path: Path) -> None:
     (tmp_path / "skew.lcp").write_text("2  2 1  0 2  -1 -1")
     (tmp_path / "damaged.lcp").write_text("3 1 2")
     (tmp_path / "readme.md").write_text("not a problem")
-    study, (check, profile) = Study(), collections({"given": tmp_path})
+    study, (check,) = Study(), collections({"given": tmp_path})
     table = check.table(study)
     one, skew, damaged = table.records()
     assert (one["problem"], skew["problem"], damaged["problem"]) == (
@@ -111,9 +103,7 @@ def test_a_folder_of_problems(tmp_path: Path) -> None:
     )
     assert skew["asymmetry of W"] > 0.1 and (skew["daqp"], skew["lemke"]) == ("refused", "solved")
     assert damaged["daqp"] == "not read" and "size 3 with 2 numbers" in damaged["why not read"]
-    assert check.sentences(table)[0].verdict == MIXED and table.holds == (True, True, False)
-    shares = profile.table(study).where(kind="frictionless", solver="lemke").column("share solved")
-    assert len(shares) == len(FACTORS) and np.all(np.diff(shares) >= 0.0)
+    assert check.sentences(table)[0].verdict == REFUTED and table.holds == (True, True, False)
 
 
 def test_a_slow_solver_is_not_asked_for_more_and_a_problem_without_solution_fails() -> None:

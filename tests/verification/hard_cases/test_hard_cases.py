@@ -96,7 +96,7 @@ def test_what_forms_the_delassus_matrix_of_ten_thousand_contacts_is_not_tried_an
     case = HARD_CASES["ten_thousand_contacts"]()
     for method in ("gram_pinv", "gram_cholesky", "damped"):
         row = judged(case, method)
-        assert (row["outcome"], row["rank"], row["time [µs]"]) == (NOT_TRIED, None, None)
+        assert (row["outcome"], row["rank"]) == (NOT_TRIED, None)
         assert "at most 2,000 contacts" in row["note"]
     assert judged(case, "svd")["outcome"] == STABLE
     assert judged(HARD_CASES["hundred_contacts"](), "gram_pinv")["outcome"] == STABLE

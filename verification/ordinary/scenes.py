@@ -12,7 +12,7 @@ import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -75,6 +75,7 @@ class Case:
 
 
 CASES: dict[str, Case] = {}
+FAMILIES: dict[str, str] = {}  # family of each case, as the report lists them
 
 
 def add(
@@ -87,8 +88,17 @@ def add(
     tolerance: float = 0.01,
 ) -> None:
     """Add a case; `truth` and `scale` are values or functions that compute them."""
-    computed = (each if callable(each) else lambda each=each: each for each in (truth, scale))
-    CASES[name] = Case(name, {"name": name} | scene, quantity, *computed, tolerance, says)
+    true, size = (each if callable(each) else partial(_given, each) for each in (truth, scale))
+    CASES[name] = Case(name, {"name": name} | scene, quantity, true, size, tolerance, says)
+
+
+def _given(value: Any) -> Any:
+    return value
+
+
+def close_family(name: str) -> None:
+    """Name the family of the cases added since the last one."""
+    FAMILIES.update((case, name) for case in CASES if case not in FAMILIES)
 
 
 def scene(
@@ -395,6 +405,8 @@ add_free("spinning_arm", scene(1.0, SPINNING_ARM, gravity=0.0), 0.5)
 add_free("floating_robot", scene(2.0, ROBOT, gravity=0.0), 0.3)
 add_free("cart_and_pendulum", scene(2.0, [CART, link("rod", 0.5, 0.5, "cart", angle=0.2)]), 0.5)
 
+close_family("spins, tops and linkages")
+
 # Balls. A ball that slides gains spin until it rolls.
 
 
@@ -522,6 +534,8 @@ add(
     "they swap velocities",
 )
 
+close_family("balls that roll and bounce")
+
 # Boxes that slide, tip and land
 
 
@@ -628,6 +642,8 @@ add(
     "the upper one follows with μg, the lower one with F/m − 3μg",
 )
 
+close_family("boxes that slide, tip and land")
+
 # Towers and loads. What stands moves by less than 1 mm, or a tenth of its thinnest body.
 
 
@@ -720,6 +736,8 @@ NARROW = [
 add_standing(
     "ball_in_groove", scene(1.0, [disc("ball", 0.01, 0.05, (0, 0.01 / SIN, 0))], NARROW), 0.01
 )
+
+close_family("towers and loads")
 
 # Statics with friction: grooves, wedges, an arch, pegs, ladders, dominoes; impacts on what rests or
 # touches
@@ -1015,6 +1033,8 @@ add(
     0.5,
 )
 
+close_family("friction that holds, and blows on what rests")
+
 # Seams of flush walls, heavy loads, gaps that bend
 
 TILES = [
@@ -1069,7 +1089,7 @@ add(
     0.01,
     "1000 t sink by less than 0.1 mm",
 )
-ARM = {"name": "arm", "joint": "revolute", "mass": 10, "inertia": 1, "velocity": [10]}
+TURNING = {"name": "arm", "joint": "revolute", "mass": 10, "inertia": 1, "velocity": [10]}
 SLIDER = {
     "name": "slider",
     "parent": "arm",
@@ -1082,7 +1102,7 @@ SLIDER = {
 }
 add(
     "slider_on_a_turning_arm",
-    scene(0.5, [ARM, SLIDER], gravity=0.0),
+    scene(0.5, [TURNING, SLIDER], gravity=0.0),
     lambda motion: np.linalg.norm(motion.place[-1, 1]),
     0.3,
     0.01,
@@ -1178,6 +1198,8 @@ add(
     0.027,
     "the push equals the friction that tilts it",
 )
+
+close_family("seams, heavy loads, joint stops")
 
 # Impacts of many contacts at once, and of one after another, without gravity; the truth is the
 # velocity at the end
@@ -1298,3 +1320,4 @@ add(
     1.0,
     "eight corners at once: it leaves with its speed",
 )
+close_family("many contacts at once, or one after another")

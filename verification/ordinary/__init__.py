@@ -1,0 +1,1 @@
+"""Ordinary scenes with their truths, judged in our default world and in MuJoCo."""

@@ -1,0 +1,81 @@
+"""Which ordinary scenes come out right, in our default world and in MuJoCo."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from importlib.util import find_spec
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from iapb.run import Run
+from iapb.scene.reading import scene_from_values
+from reference.worlds import run_world
+from verification.check import Check, Study
+from verification.finding import Part
+from verification.ordinary.scenes import CASES, FAMILIES, Motion
+from verification.table import Row, Table
+
+OURS, THEIRS = "IAPB", "MuJoCo"
+WORLDS = {OURS: "IAPB", THEIRS: "mujoco"}
+
+
+def motion_of(run: Run) -> Motion:
+    """Return the motion of a run."""
+    pose = run.pose
+    bodies = pose.shape[:2]
+    if pose.shape[2] == 3:
+        place = np.pad(pose[..., :2], ((0, 0), (0, 0), (0, 1)))
+        turned = Rotation.from_euler("z", pose[..., 2:].reshape(-1, 1))
+    else:
+        place = pose[..., :3]
+        turned = Rotation.from_quat(pose[..., 3:].reshape(-1, 4))
+    return Motion(run.time, place, turned.as_matrix().reshape(*bodies, 3, 3))
+
+
+def error_in(name: str, world: str) -> float | None:
+    """Return the error of an ordinary scene in a world, in units of what counts as right; None if
+    the run stops early."""
+    case = CASES[name]
+    run = run_world(scene_from_values(case.scene), world, partial=True)
+    if not run.complete:
+        return None
+    return case.error(motion_of(run)) / case.tolerance
+
+
+def _row(study: Study, name: str) -> Row:
+    errors = {
+        title: error_in(name, world) for title, world in WORLDS.items() if is_installed(title)
+    }
+    return {
+        "scene": name,
+        "family": FAMILIES[name],
+        "known": CASES[name].says,
+        "allowed, of the scale": CASES[name].tolerance,
+        **{f"error of {title}, of the allowed": error for title, error in errors.items()},
+        **{
+            f"{title} is right": error is not None and error <= 1.0
+            for title, error in errors.items()
+        },
+    }
+
+
+def is_installed(title: str) -> bool:
+    """Return whether a world can be simulated here."""
+    return title != THEIRS or find_spec("mujoco") is not None
+
+
+def _targets(table: Table) -> Iterator[Part]:
+    """Yield the target of the default world: no ordinary scene is wrong."""
+    yield Part.on("ordinary scenes that come out wrong", table.holds.count(False), 0)
+
+
+ORDINARY = Check(
+    key="ordinary",
+    question="Do scenes of the first day come out right in the default world, at a step of 1 ms?",
+    cases=lambda study: CASES,
+    row=_row,
+    holds=lambda row: bool(row[f"{OURS} is right"]),
+    targets=_targets,
+    digits=2,
+)
