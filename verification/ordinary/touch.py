@@ -48,8 +48,10 @@ class TimedMotion:
     scale: float
 
 
-def toss(state: Floats, restitution: float, friction: float, seconds: float) -> TimedMotion:
-    """Return a box thrown with spin onto a floor, from a state (x, y, angle and velocities)."""
+def toss_values(
+    state: Floats, restitution: float, friction: float, seconds: float
+) -> dict[str, Any]:
+    """Return the scene of a box thrown onto a floor, from a state (x, y, angle and velocities)."""
     box = {
         "name": "box",
         "joint": "planar",
@@ -59,7 +61,7 @@ def toss(state: Floats, restitution: float, friction: float, seconds: float) -> 
         "velocity": state[3:].tolist(),
         "shapes": [{"kind": "box", "size": [WIDTH, HEIGHT]}],
     }
-    scene = {
+    return {
         "name": "toss",
         "duration": seconds,
         "gravity": [0.0, -G],
@@ -67,10 +69,14 @@ def toss(state: Floats, restitution: float, friction: float, seconds: float) -> 
         "walls": [FLOOR],
         "contact": {"restitution": restitution, "friction": friction},
     }
+
+
+def toss(state: Floats, restitution: float, friction: float, seconds: float) -> TimedMotion:
+    """Return a box thrown with spin onto a floor."""
     truth, _ = tossed(state, restitution, friction, seconds)
-    return TimedMotion(
-        "a box is thrown with spin", scene, truth, np.array([1.0, 1.0, 0.5 * WIDTH]), WIDTH
-    )
+    arms = np.array([1.0, 1.0, 0.5 * WIDTH])
+    scene = toss_values(state, restitution, friction, seconds)
+    return TimedMotion("a box is thrown with spin", scene, truth, arms, WIDTH)
 
 
 def tossed(

@@ -15,7 +15,7 @@ from iapb.scene import Scene, scene_from_text
 from iapb.scene.reading import scene_from_values
 from iapb.simulation import Simulation, simulate
 from verification.certificate import certify
-from verification.ordinary.touch import INERTIA, G, heights, toss, tossed
+from verification.ordinary.touch import INERTIA, G, heights, toss_values, tossed
 
 # Some ten impacts multiply the rounding of a touch (1e-15 m) by ten each at worst.
 EXACT = 1e-8
@@ -31,9 +31,9 @@ def toss_scene(
     restitution: float = 0.6,
     seconds: float = 0.4,
 ) -> Scene:
-    values = toss(state, restitution, friction, 0.01).scene
+    values = toss_values(state, restitution, friction, seconds)
     contact = values["contact"] | {"impact_time": rule}
-    return scene_from_values(values | {"rate": rate, "duration": seconds, "contact": contact})
+    return scene_from_values(values | {"rate": rate, "contact": contact})
 
 
 def states(count: int, seed: int) -> list[NDArray[np.float64]]:
