@@ -17,6 +17,7 @@ from reports.workers import REPORT_WORKERS, executor
 from verification.certificate import certify
 from verification.check import Check, Study, Topic
 from verification.finding import Part, attempt
+from verification.laws import LAWS
 from verification.laws.bulk import GAIN, NO_CLAMP, PRINTED, TABLE, ours
 from verification.laws.topic import CAUGHT, COUNTEREXAMPLES, LAW_TABLE
 from verification.numbers import Values
@@ -125,6 +126,7 @@ def numbers(tables: Mapping[str, Table]) -> Values:
         "printed_gains": printed["gains"],
         "printed_largest_gain": printed[GAIN],
         "no_clamp_largest_gain": bare[GAIN],
+        "impact_laws": len(LAWS),
         "laws": len(laws.rows),
         "laws_kept": sum(laws.decided),
         "faults": len(caught),

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from reports.figures.figure import Drawn, Panel, recipe
 from reports.figures.plot import Plot, note
-from reports.figures.style import BLUE, BOUND, INK, MUTED, PAPER, VERMILION, line_arguments
+from reports.figures.style import BLUE, BOUND, INK, MUTED, VERMILION, line_arguments
 from verification.laws.bulk import GAIN, MEDIAN, PRINTED, ours
 from verification.scenes.books import OPEN
 from verification.scenes.ledger import WORTH_NAMING
@@ -31,27 +29,17 @@ def energy(impacts: Table, scenes: Table) -> Drawn:
         note(axes, (_NOTHING, 2.0), words, (14, 0), ha="left", color=BLUE)
         axes.plot([printed[MEDIAN], printed[GAIN]], [1.0] * 2, color=VERMILION, linewidth=2.0)
         axes.plot([printed[MEDIAN], printed[GAIN]], [1.0] * 2, "X", color=VERMILION, markersize=7)
-        _say(axes, (printed[MEDIAN], 1.0), "median of those that gain", "right")
-        _say(axes, (printed[GAIN], 1.0), "largest", "left")
+        for place, words in (
+            (printed[MEDIAN], "median of those that gain"),
+            (printed[GAIN], "largest"),
+        ):
+            note(axes, (place, 1.0), words, (0, 12), fontsize=8.5, color=VERMILION)
         places = [max(share, _NOTHING) for share in shares.values()]
         axes.plot(places, [0.0] * len(places), "|", color=INK, markersize=13, markeredgewidth=1.4)
         axes.axvline(WORTH_NAMING / 100.0, **line_arguments(BOUND, marked=False))
-        note(axes, (WORTH_NAMING / 100.0, 2.62), "1 %", fontsize=8.5, color=MUTED)
+        note(axes, (WORTH_NAMING / 100.0, 2.6), "1 %", (13, 0), fontsize=8.5, color=MUTED)
         plot.log("energy made or lost without a cause, as a share of the energy", "", "x")
         axes.set(ylim=(-0.6, 2.75), xlim=(2e-19, 1e4), yticks=(2.0, 1.0, 0.0), yticklabels=ROWS)
         axes.grid(False, axis="y")
     words = f"{ROWS[0]}: no gain. {ROWS[1]}: up to {printed[GAIN]:.2g}. {ROWS[2]}: up to {max(places):.2g}."
     return Drawn([Panel(plot.svg, words, wide=True)])
-
-
-def _say(axes: Any, place: tuple[float, float], words: str, side: str) -> None:
-    note(
-        axes,
-        place,
-        words,
-        (-8 if side == "right" else 8, 0),
-        ha=side,
-        fontsize=8.5,
-        color=VERMILION,
-        bbox={"facecolor": PAPER, "edgecolor": "none", "pad": 0.5},
-    )

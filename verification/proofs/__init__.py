@@ -53,7 +53,7 @@ GROUPS = {
     "redundant_rows": "the paper",
     "consequences": "the paper",
     "exact_instances": "the paper",
-    "errata": "errata of the paper",
+    "errata": "its errata",
     "floating_point": "floating point",
 }
 OTHER_GROUP = "our engine and its laws"
@@ -77,7 +77,7 @@ def on_proofs(
             "title": one.title,
             "says": one.statement,
             "source": one.source,
-            "holds": one.holds,
+            "proved": one.holds,
             "own kernel": YES if all(step.accepted for step in one.steps) else NO,
             "SymPy": one.sympy,
             "Coq": in_coq[one.name].coq if one.name in in_coq else NOT_APPLICABLE,
