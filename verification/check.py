@@ -23,8 +23,10 @@ from iapb.run import Run
 from iapb.scene import Scene, find_scene, load_scene
 from reference.worlds import run_world
 from verification.finding import (
+    DESIGN,
     NOT_COMPUTED,
-    NOT_TESTABLE,
+    REFUTED,
+    REPRODUCED,
     Failure,
     Finding,
     Part,
@@ -36,8 +38,9 @@ from verification.finding import (
     verdict_of_law,
 )
 from verification.numbers import Values, value_tables
+from verification.proofs import check as check_proof
 from verification.region import Region
-from verification.table import HOLDS, Row, Table, by_part, ranges, table_from
+from verification.table import HOLDS, Row, Table, by_part, table_from
 
 Case = TypeVar("Case")
 Result = TypeVar("Result")
@@ -115,18 +118,14 @@ class Check:
         are sentences (see `Column`)
     roles : MISPRINT or BEYOND for each part, or value of a column of `parts`, that is not the
         statement of the question
-    named : the words for a part, or value of a column of `parts`, in an outcome such as "fails in
-        rotation"
-    untested : what the paper states and no case tests; each is a part that cannot tell
+    by_design : the statement of `verification.proofs` that proves a part, or value of a column of
+        `parts`, in which the code forbids a failure
     draw : (study, region) -> fresh cases inside a region, which confirm it; None if there are no
         fresh cases
     prepare : (study, cases), called before the first row, for example to compute on several cores
     rule : the outcomes of all rows -> the verdict of a topic's sentence; by default one failure
         refutes
-    place, quantity, tolerance : where the paper says it, what is measured, and the limit with its
-        reason
     note : text printed below the table; digits : significant digits in print
-    axes : columns of the plotted maps: horizontal, vertical, and those that split the maps
     timed_rows : True if the selection of rows depends on measured times
     """
 
@@ -144,17 +143,12 @@ class Check:
     timed: Collection[str] = ()
     prose: Collection[str] = ()
     roles: Mapping[str, str] = field(default_factory=dict, hash=False)
-    named: Mapping[str, str] = field(default_factory=dict, hash=False)
-    untested: Sequence[str] = ()
+    by_design: Mapping[str, str] = field(default_factory=dict, hash=False)
     draw: Callable[[Study, Region], Iterable[Any]] | None = None
     prepare: Callable[[Study, Sequence[Any]], object] | None = None
     rule: Callable[[Iterable[bool | None]], str] = verdict_of_law
-    place: str = ""
-    quantity: str = ""
-    tolerance: str = ""
     note: str = ""
     digits: int = 4
-    axes: tuple[str, ...] = ()
     timed_rows: bool = False
 
     def table(self, study: Study, cases: Iterable[Any] | None = None) -> Table:
@@ -196,23 +190,22 @@ class Check:
     def conclude(self, table: Table, study: Study | None = None) -> Finding:
         """Return the finding on a claim from its judged table; without a study it draws no fresh
         cases."""
-        parts = [Part("No trial tests it.", NOT_TESTABLE, name) for name in self.untested]
+        parts = []
         for name, rows in by_part(table).items():
-            role = _of_part(self.roles, name)
-            judged = judge_part(
-                name, rows, None if role else self._fresh(study, name)
-            )  # a role decides nothing
-            parts.append(replace(judged, role=role, named=_of_part(self.named, name)))
-        return self._found(str(self.says(table)) if self.says else "", parts, table)
+            role, proof = _of_part(self.roles, name), _of_part(self.by_design, name)
+            decides = not role and not proof
+            judged = judge_part(name, rows, self._fresh(study, name) if decides else None)
+            parts.append(
+                proved(judged, proof) if proof else replace(judged, role=role or judged.role)
+            )
+        return self._found(parts, table)
 
     def not_computed(self) -> Finding:
         """Return the finding on a claim without any row."""
-        return self._found("", [Part("Not computed.", NOT_COMPUTED)], self.table_of(()))
+        return self._found([Part("Not computed.", NOT_COMPUTED)], self.table_of(()))
 
-    def _found(self, answer: str, parts: Iterable[Part], table: Table) -> Finding:
-        details = {"place": self.place, "quantity": self.quantity, "tolerance": self.tolerance}
-        found = finding_of(self.key, self.key, self.question, answer, parts, {self.key: table})
-        return replace(found, details=details | {"conditions": ranges(table)}, axes=self.axes)
+    def _found(self, parts: Iterable[Part], table: Table) -> Finding:
+        return finding_of(self.key, self.key, self.question, "", parts, {self.key: table})
 
     def _fresh(self, study: Study | None, name: str) -> Callable[[Region], Table] | None:
         """Return the function that draws and judges fresh rows of a part inside a region."""
@@ -258,6 +251,14 @@ class Check:
             part if part.verdict else replace(part, verdict=self.rule(table.holds))
             for part in given
         )
+
+
+def proved(part: Part, statement: str) -> Part:
+    """Return a part by DESIGN: it holds if the statement is proved, unless a trial contradicts."""
+    holds = part.held == part.decided and check_proof(statement).holds
+    return replace(
+        part, role=DESIGN, proof=statement, verdict=REPRODUCED if holds else REFUTED, region=None
+    )
 
 
 def _of_part(words: Mapping[str, str], name: str) -> str:

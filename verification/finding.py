@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 from iapb.errors import ArgumentError
 from iapb.names import one_of
 from verification.region import Region, confirmed
-from verification.table import Table, ranges, titled
+from verification.table import Table, titled
 
 Case = TypeVar("Case")
 Result = TypeVar("Result")
@@ -33,9 +33,12 @@ REPRODUCED, WHERE, MIXED, REFUTED, NOT_TESTABLE, NOT_COMPUTED = VERDICTS = (
 # A claim without a confirmed range that fails in more trials than it holds in is refuted, not "true
 # with exceptions".
 LEAST_SHARE = 0.5
-# A part of a claim is the paper's statement (""), a formula as printed whose failure is an erratum,
-# or ours, beyond the paper. Only the paper's statement decides the claim.
-MISPRINT, BEYOND = "misprint", "beyond"
+# A part of a claim is the paper's statement (""); or that statement where the code forbids a failure
+# (its verdict is that of a machine-checked proof, and it enters no count of trials); or a formula as
+# printed whose failure is an erratum; or ours, beyond the paper; or a check with too few trials. The
+# last three never decide the claim.
+DESIGN, MISPRINT, BEYOND, FEW = "by design", "misprint", "beyond", "few trials"
+DECIDING = ("", DESIGN)
 # The verdicts in words, and what a claim comes to: those of its statement, and three that name what
 # is wrong with it.
 IN_WORDS = dict(
@@ -63,9 +66,8 @@ KINDS = (
     IN_WORDS[NOT_TESTABLE],
     IN_WORDS[NOT_COMPUTED],
 )
-LEAST_DECIDED = (
-    10  # least number of trials that reproduce a part; for the reason see LEAST_CONFIRMING
-)
+# Least number of trials that give a part of a claim a verdict; for the reason see LEAST_CONFIRMING.
+LEAST_DECIDED = 10
 # A finding is reproduced only if every part is decided.
 WORST_FIRST = (REFUTED, MIXED, NOT_COMPUTED, NOT_TESTABLE, WHERE, REPRODUCED)
 DEPTHS = ("quick", "full")
@@ -88,8 +90,9 @@ class Part:
     optional : True if the part needs software that the project does not include; the other parts
         decide without it
     miss : one short clause for the first page that says where our method falls short; otherwise ""
-    role : "" for the statement of the question, MISPRINT or BEYOND for what is shown beside it and
-        never decides
+    role : "" or DESIGN for the statement of the question; MISPRINT, BEYOND or FEW for what is shown
+        beside it and never decides
+    proof : name of the statement that proves a part by DESIGN
     named : the quantity in words, for "fails in ..."; by default the name
     asked, measured, target : the part as a row of a table, if it has them
     value, limit, unit, least : a number and its target: at most, or `least`: at least, the limit
@@ -109,6 +112,7 @@ class Part:
     miss: str = ""
     role: str = ""
     named: str = ""
+    proof: str = ""
     asked: str = ""
     measured: str = ""
     target: str = ""
@@ -154,16 +158,16 @@ class Part:
         )
 
     @property
+    def failed(self) -> int:
+        """The number of trials in which the claim fails."""
+        return self.decided - self.held
+
+    @property
     def outcome(self) -> str:
         """The verdict in words, with the role and the region if there is one."""
         said = f"{HOLDS} where {self.region}" if self.region else IN_WORDS[self.verdict]
-        return (
-            f"{said}, as printed"
-            if self.role == MISPRINT
-            else f"{said} (beyond the paper)"
-            if self.role
-            else said
-        )
+        roles = {MISPRINT: "as printed", BEYOND: "ours", DESIGN: DESIGN, FEW: FEW}
+        return f"{said}, {roles[self.role]}" if self.role else said
 
 
 @dataclass(frozen=True)
@@ -219,7 +223,7 @@ class Finding:
     def outcome(self) -> str:
         """What a claim comes to, in words; it follows from the parts that are the statement of the
         question."""
-        stated = [part for part in self.parts if not part.role]
+        stated = [part for part in self.parts if part.role in DECIDING]
         refuted, mixed = (
             [part.named or part.name for part in stated if part.verdict == verdict]
             for verdict in (REFUTED, MIXED)
@@ -292,68 +296,60 @@ def verdict_of_law(holds: Iterable[bool | None]) -> str:
     return REFUTED if found == MIXED else found
 
 
-def judge_part(name: str, trials: Table, fresh: Callable[[Region], Table] | None = None) -> Part:
-    """Return the verdict on the trials of one part.
+FAILING = "failing"  # key of the column with the number of cases of a row in which the claim fails
 
-    A part that fails becomes "reproduced where" if a region is confirmed. A region is sought if the
-    part is mixed or holds in LEAST_DECIDED trials, since its share of the trials depends on which
-    conditions were chosen. The region is found on one half of the trials; the claim must hold in
-    all trials of the other half that lie inside the region, and in all that `fresh` draws inside.
-    At least LEAST_CONFIRMING trials must confirm the region: fresh trials if they can be drawn,
-    else those of the other half. If all trials hold but fewer than LEAST_DECIDED cases have an
-    outcome, the part is not testable here. A part with failures is mixed or refuted, however few
-    trials there are.
+
+def counts_of(trials: Table) -> tuple[int, int, int]:
+    """Return the trials in which the claim holds, those that can tell, and those that cannot.
+
+    A row is one trial, or as many as its column of cases says, of which FAILING many fail.
     """
-    verdict, timed = verdict_of_trials(trials.holds), any(column.timed for column in trials.columns)
-    held, decided, total = trials.holds.count(True), len(trials.decided), len(trials.rows)
-    said = f"holds in {held} of {decided} trials" if decided else "no trial can tell"
-    if 0 < decided < total:
-        said = f"{said}; {total - decided} more cannot tell"
-    part = Part(
-        "", verdict, name, held, decided, total - decided, None, _where_it_fails(trials), timed
-    )
-    if verdict == MIXED or (verdict == REFUTED and held >= LEAST_DECIDED):
-        region, tried = confirmed(trials, fresh)
-        most = "fails in most trials; " if verdict == REFUTED else ""
-        part, said = (
-            replace(part, region=region, verdict=WHERE if region else verdict),
-            f"{said}; {most}{tried}",
-        )
-    judged = trials.only(held is not None for held in trials.holds)
-    counts = [
-        sum(count or 0 for count in judged.column(column.key))
-        for column in trials.columns
-        if column.cases
-    ]
-    cases = max(decided, *counts, 0)
-    if decided < LEAST_DECIDED <= cases:
-        part, said = (
-            replace(part, cases=cases),
-            f"{said} ({cases} cases in the trials that can tell)",
-        )
-    elif 0 < cases < LEAST_DECIDED and part.verdict != WHERE:
-        part = replace(part, verdict=NOT_TESTABLE if part.verdict == REPRODUCED else part.verdict)
-        said = f"{said}; fewer than {LEAST_DECIDED} trials can tell"
-    return replace(part, sentence=f"{said}.")
+    keys = [column.key for column in trials.columns if column.cases]
+    held = decided = unknown = 0
+    for row, outcome in zip(trials.records(), trials.holds, strict=True):
+        count = row[keys[0]] if keys and row[keys[0]] is not None else 1
+        if outcome is None:
+            unknown += count
+            continue
+        decided += count
+        failing = row.get(FAILING)
+        held += count if outcome else count - (count if failing is None else failing)
+    return held, decided, unknown
 
 
-def _where_it_fails(trials: Table) -> str:
-    """The number of failed trials and their conditions, in words; "" if none failed."""
-    failed, decided = trials.that(False), len(trials.decided)
-    if not failed.rows:
-        return ""
-    if len(failed.rows) == decided:
-        return f"in all {decided} trials"
-    return f"in {len(failed.rows)} of {decided} trials, under these conditions: {ranges(failed)}"
+def judge_part(name: str, trials: Table, fresh: Callable[[Region], Table] | None = None) -> Part:
+    """Return the verdict on the trials of one part of a claim.
+
+    Only trials that can tell count, and fewer than LEAST_DECIDED of them give no verdict: the part
+    gets the role FEW. A part that fails becomes "reproduced where" if a region is confirmed. A
+    region is sought if the part is mixed or holds in LEAST_DECIDED trials, since its share of the
+    trials depends on which conditions were chosen. The region is found on one half of the trials;
+    the claim must hold in all trials of the other half that lie inside the region, and in all that
+    `fresh` draws inside. At least LEAST_CONFIRMING trials must confirm the region: fresh trials if
+    they can be drawn, else those of the other half.
+    """
+    timed = any(column.timed for column in trials.columns)
+    held, decided, unknown = counts_of(trials)
+    part = Part("", NOT_TESTABLE, name, held, decided, unknown, timed=timed)
+    if decided < LEAST_DECIDED:
+        return replace(part, role=FEW if decided else "")
+    part = replace(part, verdict=verdict_of_share(held / decided))
+    if held == decided or (part.verdict == REFUTED and held < LEAST_DECIDED):
+        return part
+    region = confirmed(trials, fresh)
+    return replace(part, region=region, verdict=WHERE) if region else part
 
 
 def verdict_of(parts: Iterable[Part]) -> str:
     """Return the verdict of a finding: that of its worst part.
 
-    A part with a role never counts. An optional part without any decided trial counts only if there
-    is no other part.
+    A part with a role that does not decide counts only if it has too few trials and no other part
+    decides. An optional part without any decided trial counts only if there is no other part.
     """
-    given = [part for part in parts if not part.role]
+    every = tuple(parts)
+    given = [part for part in every if part.role in DECIDING] or [
+        part for part in every if part.role == FEW
+    ]
     absent = [part.optional and part.verdict == NOT_TESTABLE and not part.decided for part in given]
     counted = [part for part, left_out in zip(given, absent, strict=True) if not left_out] or given
     return worst(part.verdict for part in counted)

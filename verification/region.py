@@ -91,9 +91,8 @@ def _inward(end: float, rounded: Callable[[float], int]) -> str:
     )
 
 
-def confirmed(trials: Table, fresh: Callable[[Region], Table] | None) -> tuple[Region | None, str]:
-    """Return the region that the other half and fresh trials confirm, and the result of the search
-    in words.
+def confirmed(trials: Table, fresh: Callable[[Region], Table] | None) -> Region | None:
+    """Return the region that the other half and fresh trials confirm; None if there is none.
 
     If the other half contradicts the region, both halves are searched; then only fresh trials can
     confirm a region.
@@ -109,32 +108,18 @@ def confirmed(trials: Table, fresh: Callable[[Region], Table] | None) -> tuple[R
         for searched, row in zip(first, trials.records(), strict=True)
     )
     if region is None or False in inside.holds:
-        contradicted = f"{region} fails in {_failing(inside)} other trials" if region else ""
-        region, inside = (search_region(trials), trials.only(())) if fresh else (None, inside)
-        if region is None:
-            return (
-                None,
-                f"no range is confirmed: {contradicted}" if contradicted else "no range is found",
-            )
+        if fresh is None:
+            return None
+        region, inside = search_region(trials), trials.only(())
+    if region is None:
+        return None
     drawn = fresh(region) if fresh else inside.only(())
     if False in drawn.holds:
-        return None, f"no range is confirmed: {region} fails in {_failing(drawn)} fresh trials"
-    region = replace(region, others=inside.holds.count(True), fresh=drawn.holds.count(True))
-    new, kind = (f" and {region.fresh} fresh ones", "fresh ones") if fresh else ("", "others")
-    open_ = drawn.holds.count(None) + inside.holds.count(None)
-    counts = f"{region.searched} trials that led to this range, {region.others} others{new}"
-    if (region.fresh if fresh else region.others) < LEAST_CONFIRMING:
-        return (
-            None,
-            f"no range is confirmed: where {region}, it holds in {counts}; needed: {LEAST_CONFIRMING} {kind}",
-        )
-    covered = f" ({region.share:.0%} of the tested range)" if region.share else ""
-    undecided = f"; {open_} more cannot tell" if open_ else ""
-    return region, f"where {region}{covered}, it holds in all {counts}{undecided}"
-
-
-def _failing(trials: Table) -> str:
-    return f"{trials.holds.count(False)} of {len(trials.decided)}"
+        return None
+    others, new = inside.holds.count(True), drawn.holds.count(True)
+    if (new if fresh else others) < LEAST_CONFIRMING:
+        return None
+    return replace(region, others=others, fresh=new)
 
 
 def search_region(trials: Table) -> Region | None:

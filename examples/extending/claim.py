@@ -48,9 +48,6 @@ def stays(row: dict[str, Any]) -> bool:
 U01 = Check(
     key="U01",
     question="A plastic impact, resolved twice, is resolved once.",
-    place="follows from (21): a projector is its own square",
-    quantity="Largest change of velocity by the second impact, relative to the velocity.",
-    tolerance="100 d ε κ(M): the rounding of two impacts.",
     cases=contacts,
     row=resolved_twice,
     holds=stays,

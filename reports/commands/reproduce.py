@@ -97,21 +97,14 @@ def make_report(out: Path, depth: str) -> Answer:
     gathered = time.perf_counter()
     undrawn: list[Failure] = []
     figures = draw_all(evidence, RECIPES, undrawn)
-    path = write_report(out, build_report(evidence, figures))
+    path = write_report(out, build_report(evidence, figures, depth))
     failed = evidence.failed + failed_cases(out / "tables", {"figures": undrawn})
     beside = write_companions(out, evidence, figures, depth)
     ended = time.perf_counter()
     took = {**evidence.seconds, "figures and page": ended - gathered}
     counts = count_claims(evidence.claims)
     lines = [
-        *(
-            [
-                f"Of {len(evidence.claims)} claims of the paper "
-                f"{'; '.join(f'{count} {words}' for count, words in counts.values())}."
-            ]
-            if counts
-            else []
-        ),
+        *(f"Claims, {kind}: {count}." for kind, count in counts.items() if count),
         *(f"{topic.title}: {topic.answer}" for topic in evidence.topics),
         f"\n{path} ({path.stat().st_size / 1e6:.1f} MB, from {len(evidence.runs)} runs) in {ended - started:.0f} s.",
         f"Beside it: {', '.join(file.name for file in beside)}.",

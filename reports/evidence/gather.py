@@ -27,6 +27,7 @@ from reports.workers import REPORT_WORKERS, executor
 from verification import haptic_rate
 from verification.check import Study
 from verification.claims import peg
+from verification.claims.numbers import claim_tables
 from verification.cost import effects
 from verification.finding import Failure, Finding, attempt
 from verification.proofs import on_proofs
@@ -130,6 +131,7 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
         scenes=scenes,
         claims=ledger,
         effects=shown,
+        numbers={"claims": claim_tables(ledger, lost)},
         topics=tuple(topics),
         failed=failed,
         provenance=facts,

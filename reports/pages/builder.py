@@ -18,11 +18,17 @@ from reports.figures import RECIPES
 from reports.figures.condition_map import condition_map
 from reports.figures.figure import TEXTS, Figure, Recipe, draw, swatch
 from reports.figures.numbers import format_cell, is_number
+from reports.pages.first import count_claims
 from reports.pages.formulas import formula, prose
 from reports.pages.numbers import FILTERS, is_absent, numbers_of
 from reports.pages.page import PAGES
 from reports.pages.records import Evidence
 from verification import finding
+from verification.claims.numbers import LEFT_OPEN
+from verification.claims.peg import ALL_THREE, FEWER, LARGER, NEARER, SETTLES
+from verification.claims.socket import JUMP
+from verification.claims.walls import BOTH, SOONER
+from verification.claims.walls import SETTLES as SETTLED
 from verification.finding import Failure, Finding, Part
 from verification.numbers import NUMBERS, TIMES
 from verification.table import Table
@@ -31,6 +37,7 @@ from verification.table import Table
 ROWS_SHOWN = 200
 # Whose numbers the templates may quote, computed or not.
 QUOTED = (
+    "energy",
     "claims",
     "figures",
     "energy",
@@ -74,6 +81,21 @@ OUTCOME_CLASSES = dict(
 FINDINGS = finding.IN_WORDS | {
     finding.MIXED: "holds in part"
 }  # in words, for checks that are no claims
+# Claims with a map of where they hold: its horizontal axis, its vertical axis, and one map for each
+# value of a third column.
+MAPS = {
+    "C10": ("tilt", "clearance", "part"),
+    "C13": ("tilt", "clearance", "coordinate"),
+    "C15": ("tilt", "clearance", "part"),
+    "C18": (JUMP, "coherence distance", "damping"),
+    "C21": ("stiffness", "rate", "against"),
+}
+# Parts of ours that the ledger shows beside the paper's; the others are folded.
+OURS_SHOWN = {
+    "C10": (f"{NEARER}, {ALL_THREE}",),
+    "C15": (f"{FEWER}, {LARGER}", f"{SETTLES}, {LARGER}"),
+    "C21": (f"{BOTH}, {SETTLED}", f"{BOTH}, {SOONER}"),
+}
 
 
 def draw_all(
@@ -84,7 +106,9 @@ def draw_all(
     return [draw(recipe, inputs, failures) for recipe in recipes]
 
 
-def build_report(evidence: Evidence, drawn: Iterable[Figure] = ()) -> dict[str, str]:
+def build_report(
+    evidence: Evidence, drawn: Iterable[Figure] = (), depth: str = ""
+) -> dict[str, str]:
     """Return the HTML of the ten pages by file name, the first page first.
 
     Missing evidence is printed as "not computed in this run". Every page links to the others and
@@ -114,6 +138,10 @@ def build_report(evidence: Evidence, drawn: Iterable[Figure] = ()) -> dict[str, 
         "figures": bare | {figure.key: figure for figure in given},
         "run_counts": Counter(user for run in evidence.runs for user in run.used_by),
         "maps": {claim.key: map_of(claim) for claim in evidence.claims},
+        "ours_shown": OURS_SHOWN,
+        "kinds": count_claims(evidence.claims),
+        "depth": depth,
+        "left_open": evidence.numbers.get("claims", {}).get(LEFT_OPEN),
     }
     return link_across(
         {
@@ -158,15 +186,33 @@ def figure_inputs(evidence: Evidence) -> dict[str, Any]:
 
 
 def map_of(claim: Finding) -> Figure | None:
-    """Return a map of where a claim holds, over its two decisive conditions; None if it holds
-    everywhere."""
+    """Return a map of where a claim holds, over its two decisive conditions; None if it has none."""
     table = claim.tables.get(claim.key)
-    if not claim.axes or claim.verdict == finding.REPRODUCED or table is None or not table.rows:
+    if claim.key not in MAPS or table is None or not table.rows:
         return None
-    caption = f"Each place is a pair of values of the axes; smaller dot: {claim.key} holds in only some trials there."
-    return condition_map(
-        f"map-{claim.key}", f"Where {claim.key} holds", caption, table, *claim.axes
-    )
+    if "part" in table.keys:
+        stated = {part.name for part in claim.parts if part.role in finding.DECIDING}
+        table = table.only(name in stated for name in table["part"])
+    caption = "Smaller dot: it holds in only some trials there."
+    title = f"Where {claim.key} holds"
+    return condition_map(f"map-{claim.key}", title, caption, table, *MAPS[claim.key])
+
+
+def stated(parts: Iterable[Part], shown: Sequence[str]) -> list[Part]:
+    """Return the parts that the ledger shows: the paper's, misprints, and those of ours in
+    `shown`."""
+    return [
+        part
+        for part in parts
+        if part.role in (*finding.DECIDING, finding.MISPRINT) or part.name in shown
+    ]
+
+
+def unstated(parts: Iterable[Part], shown: Sequence[str]) -> list[Part]:
+    """Return the parts that the ledger folds."""
+    every = tuple(parts)
+    seen = stated(every, shown)
+    return [part for part in every if part not in seen]
 
 
 def ranked(found: Iterable[Any]) -> list[Any]:
@@ -192,26 +238,6 @@ def judged(part: Part) -> str:
     )
     return (
         part.outcome if part.role or part.region else met.get(part.verdict, FINDINGS[part.verdict])
-    )
-
-
-def counted(part: Part) -> str:
-    """Return as text in how many of the decided trials a part holds, how many cannot tell, and its
-    region's counts."""
-    if not part.decided and not part.unknown:
-        return "no trials" if part.verdict == finding.NOT_TESTABLE else ""
-    unknown = f" ({part.unknown} more cannot tell)" if part.unknown else ""
-    cases = f" ({part.cases} cases in these trials)" if part.cases else ""
-    if not (region := part.region):
-        return f"{part.held} of {part.decided}{cases}{unknown}"
-    share = f"; {region.share:.0%} of the tested range" if region.share else ""
-    both = (region.others, "other"), (region.fresh, "new")
-    confirmed = " and ".join(f"{count} {which}" for count, which in both if count)
-    without = " (new trials not counted)" if region.fresh else ""
-    return (
-        f"(range chosen from {region.searched} trials, confirmed by {confirmed} trials{share}); "
-        f"over all "
-        f"conditions{without} {part.held} of {part.decided}{cases}{unknown}"
     )
 
 
@@ -242,9 +268,10 @@ def _environment() -> Environment:
         outcome_class=OUTCOME_CLASSES.__getitem__,
         judged=judged,
         badge_words=badge_words,
-        counted=counted,
         tables_without=tables_without,
         ranked=ranked,
+        stated=stated,
+        unstated=unstated,
         title=lambda name: name[:1].upper() + name[1:],
         **FILTERS,
     )

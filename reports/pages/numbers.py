@@ -36,12 +36,18 @@ class Absent:
 
 
 class Numbers:
-    """The numbers of a topic by key, without names of its own that could hide a key."""
+    """The numbers of a topic by key, without names of its own that could hide a key.
+
+    The key of a claim's number is "C10 ...": if C10 was not computed, its numbers are Absent.
+    """
 
     def __init__(self, values: Mapping[str, Any]) -> None:
         self._values = values
 
     def __getitem__(self, key: str) -> Any:
+        claim, space, _ = key.partition(" ")
+        if space and not any(name.startswith(claim + space) for name in self._values):
+            return Absent()
         return self._values[key]
 
 

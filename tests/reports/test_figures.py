@@ -230,7 +230,11 @@ def all_inputs():
         for name in needed
         if name.startswith("scene/")
     }
-    tilted = {tilt: {name: runs[f"corner/{name}"] for name in UNLIMITED} for tilt in (0.0, 0.015)}
+    tilted = {
+        tilt: {name: runs[f"corner/{name}"] for name in UNLIMITED}
+        | {"IAPB-push": runs["corner/IAPB"]}
+        for tilt in (0.015, 0.2)
+    }
     study, checks = (
         Study(),
         {f"{topic}/{check.key}": check for topic, checks in CHECKS.items() for check in checks},

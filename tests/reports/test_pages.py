@@ -201,8 +201,8 @@ def test_powers_of_ten_read_as_people_write_them(text, shown):
 
 def test_a_figure_names_its_runs_and_the_command_that_draws_it_and_a_long_table_is_cut():
     panel = Panel(grid(("a",), {"row": [cell("x")]}), 'says "x"')
-    drawn = Figure("hero", "", "A table", "Look.", (panel,), None, (), ("C10", "a table"))
-    page = build_report(Evidence(runs=RUNS), [drawn])[FIRST_PAGE]
+    drawn = Figure("fig07", "", "A table", "Look.", (panel,), None, (), ("C10", "a table"))
+    page = build_report(Evidence(runs=RUNS), [drawn])["report/figures.html"]
     assert '<table aria-label="says &#34;x&#34;" class="grid' in page and "&lt;table" not in page
     assert "Data: C10, a table. To compute it again: <code>iapb reproduce --fig" in page
     rows = tuple((float(n),) for n in range(ROWS_SHOWN + 1))

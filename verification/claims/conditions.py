@@ -45,6 +45,7 @@ IGNORED = {
     "CBuc": _RIGID_IGNORES,
     "PB": ("collision_threshold",),
     "IAPB": (),
+    "IAPB-push": (),
 }
 
 
@@ -114,9 +115,6 @@ TILTS = {
 }
 CLEARANCES = {"quick": (0.003, 0.010, 0.020), "full": (0.002, 0.005, 0.010, 0.015, 0.020, 0.030)}
 TRAVELS = {"quick": (0.002, 0.020), "full": (0.001, 0.002, 0.004, 0.016, 0.020, 0.030)}
-# Evenly spaced tilts, a subset of the full ones (most of which are small): they show how results
-# depend on the grid.
-EVEN_TILTS = tuple(n / 20 for n in range(8))
 FRICTIONS = (0.1, 0.3)
 # With 1e-6 every approaching contact collides, as in the paper. An existing contact that the hand
 # pushes slowly into its wall also approaches, at up to F_h / B = 0.5 N / 50 N s/m = 10 mm/s: the

@@ -15,7 +15,7 @@ from verification.cost.calls import kernel_call, lemke_call, solver_call
 from verification.cost.problems import patch, pile
 from verification.finding import BEYOND
 from verification.region import Region
-from verification.table import Row, Table
+from verification.table import Row
 
 # C19: the haptic rate with many contacts
 
@@ -42,45 +42,20 @@ def _fresh_sizes(study: Study, region: Region) -> Iterator[Sizes]:
         yield from (Sizes(d, method, (c,)) for method in growth.TITLES)
 
 
-def _rate_says(table: Table) -> str:
-    texts = [
-        f"{method} in {deadline}: {', '.join(f'{count} at d = {d}' for d, count in most.items())}"
-        for deadline in growth.DEADLINES
-        for method, most in growth.most_contacts(table, deadline).items()
-    ]
-    return (
-        "The paper leaves this question open. On this machine, the largest number of contacts at "
-        "which 99.9 % of "
-        f"the impacts are in time, with d coordinates: {'; '.join(texts)}. The times are CPU "
-        f"times of the "
-        "thread; they do not show that a real-time loop keeps the deadline."
-    )
-
-
 C19 = Check(
     key="C19",
     question="One pseudo-inverse per step meets the haptic rate with many simultaneous collisions.",
-    place="Sections VII and VIII, as an open question",
-    quantity="Number of impacts, out of 1000 in a row, that take longer than the paper's step of 1/512 s. The rank of "
-    "the rows is two thirds of the number d of coordinates. The printed formula (21) is evaluated "
-    "in numpy. Beyond the "
-    "paper: a deadline of 1 ms, and the engine's factored form, which is compiled and forms no "
-    "pseudo-inverse. Once a "
-    "size is too slow, larger sizes are not tried.",
-    tolerance="At most one of the 1000 impacts is late. A size that fails is tried up to three times.",
     roles={growth.TITLES[growth.FACTORED]: BEYOND, growth.MILLISECOND: BEYOND},
     cases=lambda study: [Sizes(d, method) for d in growth.COORDINATES for method in growth.TITLES],
     draw=_fresh_sizes,
     row=lambda study, case: growth.haptic_rate(
         case.coordinates, case.method, case.contacts, failures=study.failures
     ),
-    says=_rate_says,
     holds=lambda row: bool(row["late calls"] <= growth.ALLOWED),
     parts=["method", "deadline"],
     conditions=["coordinates", "contacts"],
     timed=["late calls", "time"],
     timed_rows=True,
-    axes=("contacts", "coordinates", "method"),
 )
 
 
@@ -142,64 +117,15 @@ def costs_more(row: Row) -> bool | None:
     )
 
 
-def _ratio_says(table: Table) -> str:
-    texts = []
-    for part in dict.fromkeys(table.column("problem")):
-        rows = table.where(problem=part)
-        shown = {
-            row["contacts"]: f"{float(format(row['ratio'], '.2g')):g}"
-            for row in rows.records()
-            if row["ratio"] is not None and row["contacts"] in (1, 6, 16, 64, 192)
-        }
-        clear = (rows.that(outcome).column("contacts") for outcome in (True, False))
-        above, below = (
-            f"with {found[0]} to {found[-1]} contacts"
-            if len(found) > 9
-            else f"with {', '.join(map(str, found)) or 'no number of'} contacts"
-            for found in clear
-        )
-        texts.append(
-            f"For {part} the ratio is {', '.join(shown.values())} with "
-            f"{', '.join(map(str, shown))} contacts: "
-            f"clearly above 1 {above}, clearly below 1 {below}; {rows.holds.count(None)} of "
-            f"{len(rows.rows)} sizes cannot tell."
-        )
-    return (
-        "The paper speaks of whole time steps with constraint stabilization. We do not time whole "
-        "steps with "
-        "complementarity. Beyond the paper, we divide the time of one frictionless impact by "
-        "Lemke's method by the "
-        f"time of that impact by IAPB, both compiled. {' '.join(texts)} The paper's scene has at "
-        f"most six "
-        "collisions at once."
-    )
-
-
 C22 = Check(
     key="C22",
     question="Time stepping with complementarity costs more than IAPB.",
-    place="Section II",
-    untested=("whole time steps with constraint stabilization",),
     roles=dict.fromkeys(PROBLEMS, BEYOND),
-    quantity="Beyond the paper: CPU time of a frictionless impact by complementarity, divided by that of IAPB. Both "
-    "are compiled and timed in turns in one run, in random order, on several impacts of each "
-    "size. The impacts have "
-    "1 to 300 contacts on a patch (all but three redundant) or in a pile (none redundant); both "
-    "methods give the same "
-    "v⁺.",
-    tolerance="A trial holds (clearly above 1) if the lower quartile of the ratios is at least 1.1, and fails (clearly "
-    "below 1) if the upper quartile is at most 1/1.1; else it cannot tell. Between processes on a "
-    "busy machine the "
-    "median of a size moved by up to 12 %, once by 19 %: a verdict near the limit can change.",
     cases=lambda study: [Impact(problem, contacts) for contacts in SIZES for problem in PROBLEMS],
     row=_ratio,
     holds=costs_more,
-    says=_ratio_says,
     parts=["problem"],
     conditions=["contacts"],
     timed=TIMES,
     timed_rows=True,
-    axes=("contacts", "decades", "problem"),
-    note="Ratio: Lemke's time over IAPB's. A "
-    "row holds if the lower quartile is at least 1.1, and fails if the upper quartile is at most 1/1.1.",
 )

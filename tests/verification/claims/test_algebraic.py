@@ -49,7 +49,7 @@ def test_the_algebraic_claims_of_the_engine():
 @pytest.mark.parametrize("fault", [energetic, lossy])
 def test_losses_notice_a_wrong_energy(monkeypatch, fault):
     monkeypatch.setattr(algebraic, "resolve_impact", fault)
-    claim = algebraic.losses("C01", "", "", [Family(3, 1, 1, 1e2)], {"quick": 4})
+    claim = algebraic.losses("C01", "", "theorem_1", [Family(3, 1, 1, 1e2)], {"quick": 4})
     wrong = {row["part"] for row in claim.table(Study(seed=1)).that(False).records()}
     assert algebraic.WITH_HALF in wrong
     assert (algebraic.PASSIVE in wrong) == (fault is energetic)
@@ -61,6 +61,21 @@ def test_losses_notice_a_wrong_energy(monkeypatch, fault):
 def test_a_planted_fault_is_noticed(monkeypatch, claim, fault):
     monkeypatch.setattr(algebraic, "resolve_impact", fault)
     assert False in CLAIMS[claim].table(Study()).holds
+
+
+def test_an_error_that_is_no_number_is_a_failure_and_failing_impacts_are_counted():
+    assert algebraic.finite([1.0, np.nan]).tolist() == [1.0, np.inf]
+    measure = algebraic.Measure(lambda batch: np.arange(len(batch.impacts)), lambda batch: 1.0)
+    claim = algebraic.batches(
+        "C99",
+        "",
+        families=[Family(1, 1, 1, 1e0)],
+        restitutions=(0.0,),
+        impacts={"quick": 5},
+        parts={"x": measure},
+    )
+    (row,) = claim.table(Study()).records()
+    assert (row["impacts"], row["failing"], claim.table(Study()).holds) == (5, 3, (False,))
 
 
 def test_instances_repeat_and_have_the_rank_they_say():
