@@ -21,7 +21,7 @@ def energy(impacts: Table, scenes: Table) -> Drawn:
     told = ours(impacts)
     printed = impacts.where(method=PRINTED).records()[0]
     shares = {row["scene"]: row[OPEN] / 100.0 for row in scenes.records()}
-    with Plot("what-makes-energy", (7.4, 2.5)) as plot:
+    with Plot("what-makes-energy", (6.2, 2.6)) as plot:
         axes = plot.axes
         found = [max(gain, _NOTHING) for gain in told[GAIN]]
         axes.plot(found, [2.0] * len(found), "o", color=BLUE, markersize=7)
@@ -42,4 +42,4 @@ def energy(impacts: Table, scenes: Table) -> Drawn:
         axes.set(ylim=(-0.6, 2.75), xlim=(2e-19, 1e4), yticks=(2.0, 1.0, 0.0), yticklabels=ROWS)
         axes.grid(False, axis="y")
     words = f"{ROWS[0]}: no gain. {ROWS[1]}: up to {printed[GAIN]:.2g}. {ROWS[2]}: up to {max(places):.2g}."
-    return Drawn([Panel(plot.svg, words, wide=True)])
+    return Drawn([Panel(plot.svg, words)])

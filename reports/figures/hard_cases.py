@@ -38,7 +38,7 @@ WORDS = {
     "Newton with Coulomb": "Newton, Coulomb",
 }
 # world -> share of the time at which its name stands, and the way to it [points]
-_NAMES_AT = {"IAPB": (0.1, (34.0, 6.0)), "PB": (0.5, (0.0, 12.0)), "ideal": (0.1, (36.0, 8.0))}
+_NAMES_AT = {"IAPB": (0.1, (34.0, 6.0)), "PB": (0.5, (0.0, 12.0)), "ideal": (0.7, (0.0, 10.0))}
 Rows = list[dict[str, Any]]
 
 
