@@ -99,6 +99,14 @@ def test_elastic_bounces_keep_their_height() -> None:
     assert np.abs(run.energy["integration_residual"]).max() < 1e-11
 
 
+def test_the_ledger_has_the_loss_of_an_impact_within_a_step() -> None:
+    """A ball that falls by 0.1 m loses 1 − e² of that height's energy in its first bounce."""
+    run = simulate(scene_from_text(bouncing().replace("restitution: 1", "restitution: 0.5")))
+    first = int(run.impacts.step[0])
+    assert run.energy["impact_loss"][first] == pytest.approx(0.75 * G * 0.1, rel=1e-9)
+    assert run.energy["impact_loss"][-1] == pytest.approx(run.impacts.energy_lost.sum(), rel=1e-12)
+
+
 def test_corners_of_a_fast_spin_touch_without_overlap() -> None:
     """Seen from an overlap, Newton's method may look before the touch; it comes back from the gap."""
     start = np.array([0.0, 0.4, 0.7, 0.3, 0.0, 3.0])
