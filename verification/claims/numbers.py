@@ -32,8 +32,9 @@ def claim_tables(findings: Iterable[Finding], failures: list[Failure]) -> dict[s
         if key in claims:
             table = claims[key].tables[key]
             values |= attempt(f"numbers of {key}", partial(function, table), failures) or {}
-    values |= _limits(claims)
-    values |= {f"{key} {kind}": count for key, kind, count in _counts(claims)}
+    values |= attempt("limits of C10", partial(_limits, claims), failures) or {}
+    counts = attempt("numbers of impacts", lambda: list(_counts(claims)), failures) or []
+    values |= {f"{key} {kind}": count for key, kind, count in counts}
     tables = value_tables(values)
     rows: list[dict[str, Any]] | None = attempt(
         LEFT_OPEN, lambda: list(left_open(claims)), failures
@@ -46,13 +47,13 @@ def _counts(claims: Claims) -> Iterator[tuple[str, str, float]]:
     the parts that decide."""
     for key, one in claims.items():
         table = one.tables[key]
-        if {"error", "impacts"} <= set(table.keys):
+        if {"error", "impacts", "bound"} <= set(table.keys):
             named = {part.name for part in one.parts if part.role in DECIDING}
-            rows = [row for row in table.records() if row["part"] in named]
-            yield key, "error", max((row["error"] for row in rows), default=0.0)
+            drawn = [row for row in table.records() if row["impacts"] and row["part"] in named]
+            yield key, "error", max((row["error"] for row in drawn), default=0.0)
             counts = dict.fromkeys(named, 0)
-            for row in rows:
-                counts[row["part"]] += row["impacts"] or 0
+            for row in drawn:
+                counts[row["part"]] += row["impacts"]
             yield key, "impacts", max(counts.values(), default=0)
 
 
@@ -298,8 +299,8 @@ def left_open(claims: Claims) -> Iterator[dict[str, Any]]:
                 "value": MILLI * speed_,
                 "unit": "mm/s",
                 "measured": "median time to rest [s]",
-                "IAPB": _mean_of(settles[speed_], "IAPB"),
-                "spring": _mean_of(settles[speed_], "PB"),
+                "IAPB": _mean_of(settles.get(speed_, []), "IAPB"),
+                "spring": _mean_of(settles.get(speed_, []), "PB"),
             }
     if "C10" in claims:
         table = claims["C10"].tables["C10"].where(part=f"{peg.NEARER}, {peg.ALL_THREE}")

@@ -1,0 +1,63 @@
+"""The numbers of the claims that pages quote: a broken table costs its own numbers alone."""
+
+from verification.claims import CLAIMS, peg, walls
+from verification.claims.conditions import Condition
+from verification.claims.numbers import LEFT_OPEN, claim_tables
+from verification.numbers import NUMBERS
+
+
+def settling(threshold, ours, theirs):
+    return {
+        "part": peg.of_setting(peg.FEWER, Condition(collision_threshold=threshold)),
+        **Condition(collision_threshold=threshold).row(),
+        "IAPB": ours,
+        "IAPB, limited": ours,
+        "PB": theirs,
+        "ahead": theirs - ours,
+        "ahead, limited": theirs - ours,
+    }
+
+
+def wall(test, ours, theirs):
+    return {
+        "against": walls.BOTH,
+        "test": test,
+        "stiffness [N/m]": 1e3,
+        "impulses settle after [s]": ours,
+        "penalty settles after [s]": theirs,
+    }
+
+
+def concluded(key, rows):
+    return CLAIMS[key].conclude(CLAIMS[key].table_of(rows))
+
+
+def test_bounces_are_summed_by_threshold_and_walls_are_counted_by_law():
+    bouncing = [settling(1e-6, 1.0, 5.0)] * 2 + [settling(1e-2, 7.0, 5.0)] * 2
+    rows = [wall(walls.SETTLES, 0.1, float("inf")), wall(walls.SETTLES, float("inf"), 0.1)]
+    rows += [wall(walls.SETTLES, 0.1, 0.1) | {"against": walls.SAME_DAMPING}]
+    rows += [
+        wall(walls.SETTLES, 0.2, 0.1),
+        wall(walls.SOONER, 0.2, 0.1),
+        wall(walls.SOONER, 0.1, 0.1),
+    ]
+    lost = []
+    tables = claim_tables([concluded("C15", bouncing), concluded("C21", rows)], lost)
+    assert lost == [] and tables[LEFT_OPEN].rows
+    found = dict(tables[NUMBERS].rows)
+    assert found["C15 bounces at 0.001 mm/s"] == 2 and found["C15 bounces at 10 mm/s"] == 14
+    assert found["C15 bounces of the spring at 10 mm/s"] == 10
+    of = f"C21 {walls.BOTH}"
+    assert (found[f"{of} impulses"], found[f"{of} springs"]) == (2, 2)
+    assert (found[f"{of} impulses only"], found[f"{of} springs only"]) == (1, 1)
+    assert (found["C21 sooner impulses"], found["C21 sooner springs"]) == (0, 1)
+
+
+def test_a_table_that_lacks_a_column_costs_its_own_numbers_alone():
+    lost = []
+    broken = concluded("C15", [settling(1e-6, 1.0, 5.0)])
+    broken.tables["C15"] = broken.tables["C15"].without("IAPB")
+    arm = concluded("C07", [{"expected": "part", "share lost": 0.5, "reading": "x"}])
+    found = dict(claim_tables([broken, arm], lost)[NUMBERS].rows)
+    assert found["C07 least share"] == 0.5 and "numbers of C15" in {one.case for one in lost}
+    assert not any(key.startswith("C15") for key in found)
