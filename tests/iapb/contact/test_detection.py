@@ -302,6 +302,20 @@ def test_a_flat_face_on_a_face_keeps_its_points_and_names_whichever_rounding_tak
         assert sorted(level.feature.tolist()) == sorted(found.feature.tolist())
 
 
+@pytest.mark.parametrize("swapped", [False, True])
+def test_a_tilted_cube_on_a_large_one_is_as_deep_as_its_lowest_corner(swapped: bool) -> None:
+    """The faces are parallel to 0.012 rad: that of the first box decides only if it is as near, to
+    1e-4 of the size."""
+    system = pair_of(CUBE, CUBE | {"size": [4, 4, 1]}, swapped)
+    place = [0.0, 0.0, 1.0, 0.0, np.sin(0.006), 0.0, np.cos(0.006)]
+    still = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
+    q = at_places(system, *((still, place) if swapped else (place, still)))
+    found = system.contacts_at(q)
+    deepest = 0.5 - 0.5 * (np.cos(0.012) + np.sin(0.012))
+    assert found.gap.min() == pytest.approx(deepest, abs=1e-9)
+    assert np.abs(found.normal[:, 2]) == pytest.approx(1.0, abs=1e-12)  # of the large face
+
+
 @pytest.mark.parametrize("turn", [0.0, 0.5 * np.pi, np.pi])
 @pytest.mark.parametrize("offset", [(0.4, 0.0), (0.0, -0.3), (0.0, 0.0), (0.25, 0.1)])
 @pytest.mark.parametrize("noise", [0.0, 1e-16, -1e-16, 1e-13])
