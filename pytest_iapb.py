@@ -1,5 +1,5 @@
-"""pytest plugin: one test per law for an impact resolver. It imports this project only if a test
-uses it.
+"""pytest plugin: one test per law for an impact resolver, or with `device=BareDevice(...)` for a force
+law. It imports this project only if a test uses it.
 
 import pytest
 from my_solver import resolve
@@ -20,7 +20,7 @@ import pytest
 IMPACTS = 1000  # for each law, unless the marker or --iapb-impacts gives another number
 _MARKER = (
     "iapb(contract='equality', laws=None, impacts=1000, **options): what `iapb_law` judges by; "
-    "options as of verification.check_passivity"
+    "options as of verification.check_passivity; with device=BareDevice(...), of check_force"
 )
 
 
@@ -66,12 +66,9 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     from iapb.errors import IapbError
     from iapb.lazy import needed
 
-    asked = {"contract": "equality", "laws": None, "unequal_restitution": False} | _asked(
-        metafunc.definition
-    )
     try:
-        kit = needed("verification.laws.kit", "The fixture iapb_law")
-        laws = kit.choose_laws(asked["contract"], asked["laws"], asked["unequal_restitution"])
+        kits = needed("verification.port.marked", "The fixture iapb_law")
+        laws = kits.laws_of(_asked(metafunc.definition))
     except IapbError as error:
         pytest.fail(f"marker iapb: {error}", pytrace=False)
     metafunc.parametrize("iapb_law", list(laws), indirect=True)
@@ -79,18 +76,19 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 @pytest.fixture
 def iapb_law(request: pytest.FixtureRequest) -> Callable[[Callable[..., Any]], None]:
-    """Return a function that tests a resolver against one law and fails the test with a shrunk
-    counterexample."""
-    from verification import check_passivity
+    """Return a function that tests a resolver, or a force law if the marker has a device, against one
+    law and fails the test with a shrunk counterexample."""
+    from verification.port.marked import judged
 
-    asked = {"impacts": IMPACTS} | _asked(request.node) | {"laws": [request.param]}
+    asked = _asked(request.node)
     impacts = request.config.getoption("--iapb-impacts")
-    asked["impacts"] = asked["impacts"] if impacts is None else impacts
+    if impacts is not None:
+        asked["impacts"] = impacts
     asked.setdefault("seed", request.config.getoption("--iapb-seed"))
 
-    def judge(resolver: Callable[..., Any]) -> None:
+    def judge(subject: Callable[..., Any]) -> None:
         __tracebackhide__ = True
-        report = check_passivity(resolver, **asked)
+        report = judged(subject, request.param, IMPACTS, asked)
         if not report.passed:
             pytest.fail(f"{report}\n\nseed {report.seed}", pytrace=False)
 

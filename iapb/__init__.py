@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     from verification.certificate import Certificate as Certificate
     from verification.certificate import certify as certify
     from verification.certificate import certify_impacts as certify_impacts
+    from verification.port import BareDevice as BareDevice
+    from verification.port import check_force as check_force
 
     __version__: str
 
@@ -64,7 +66,14 @@ _HOME = {
     "iapb.scene": ("Scene", "find_scene", "load_scene", "scene_folder"),
     "iapb.simulation": ("Simulation", "simulate"),
     # upper packages bring these as entry points: the engine never imports one
-    "": ("Certificate", "certify", "certify_impacts", "check_passivity"),
+    "": (
+        "BareDevice",
+        "Certificate",
+        "certify",
+        "certify_impacts",
+        "check_force",
+        "check_passivity",
+    ),
 }
 
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}

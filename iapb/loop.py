@@ -8,7 +8,7 @@ import numpy as np
 
 from iapb.contact.kernels.motion import STATUS_TEXT
 from iapb.contact.kernels.step import advance, contact_state
-from iapb.haptics.rendering import NO_COUPLING, couple, move_device, render
+from iapb.haptics.rendering import NO_COUPLING, couple, move_device, read_device, render
 from iapb.numerics.compiled import Entry, block, copy_into, kernel
 from iapb.numerics.linalg import load, store
 from iapb.numerics.schema import Quantity, blank, quantities
@@ -163,4 +163,20 @@ def steps_of_loop(world, state, port, record, parts, first, steps):
     return steps, 0
 
 
+@kernel
+def steps_with_hand(world, state, port, q, v, forces):
+    """Do one step of an engine law for each reading (n, d) of a device that the hand moves; write the
+    actuator force of each step."""
+    for k in range(q.shape[0]):
+        read_device(world, state, port, q[k], v[k])
+        couple(world, state, port)
+        status = advance(world, state, port.applied)
+        if status:
+            return k, status
+        render(world, state, port)
+        copy_into(forces[k], port.device_force)
+    return q.shape[0], 0
+
+
 run_steps = Entry(steps_of_loop)
+follow_hand = Entry(steps_with_hand)

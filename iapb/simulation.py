@@ -32,6 +32,7 @@ from iapb.engines import Engine, is_engine
 from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import Coupling, NoCoupling
 from iapb.haptics.device import Device, DeviceLink
+from iapb.haptics.rendering import read_device
 from iapb.loop import (
     ADVANCE,
     COUPLE,
@@ -40,9 +41,12 @@ from iapb.loop import (
     RENDER,
     WHOLE,
     WRITE,
+    follow_hand,
     make_record,
     run_steps,
 )
+from iapb.numerics.compiled import Entry
+from iapb.numerics.schema import Floats
 from iapb.recording import Recorder
 from iapb.run import COLLIDING, FREE, INTERRUPTED, RESTING, Run
 from iapb.scene import Scene, find_scene, load_scene
@@ -114,6 +118,7 @@ class Simulation:
         )
         self._planned = self.scene.hand is not None and self.scene.hand.changes
         self.steps_done = 0
+        self._first: list[np.ndarray] | None = None  # of `_rewind`
 
     @property
     def time(self) -> float:
@@ -154,6 +159,43 @@ class Simulation:
             self.link.exchange()
         self.steps_done += 1
         return copied_step(self.system, self.state)
+
+    def follow(self, q: Floats, v: Floats) -> Floats:
+        """Move the device through readings (n, d) of its position and velocity, one a step; return
+        the actuator forces (n, d).
+
+        Each call begins at the scene's start. The simulation needs a coupling; sensors and delay are
+        the caller's.
+        """
+        self._rewind()
+        forces = np.zeros(q.shape)
+        status = 0
+        if self.compiled:
+            _, status = follow_hand(self.world, self.state, self.port, q, v, forces)
+        else:
+            for k in range(len(q)):
+                self._read(self.world, self.state, self.port, q[k], v[k])
+                self._do(COUPLE)
+                self._take(
+                    self.law.advance(self.system, self.state, self.port.applied, self.system.dt)
+                )
+                self._do(RENDER)
+                forces[k] = self.port.device_force
+        if status:
+            raise IapbError(FAILURES[status])
+        return forces
+
+    @cached_property
+    def _read(self) -> Any:
+        return Entry(read_device)
+
+    def _rewind(self) -> None:
+        """Return to the state in which this was called first."""
+        arrays = self.state.arrays() + self.port.arrays()
+        if self._first is None:
+            self._first = [array.copy() for array in arrays]
+        for array, first in zip(arrays, self._first, strict=True):
+            array[...] = first
 
     def _do(self, parts: int) -> None:
         """Do parts of one step."""

@@ -16,9 +16,10 @@ from iapb.contact.kernels.impact import ImpactWork, factored_impacts
 from iapb.contact.kernels.passive import gain_signs
 from iapb.haptics.coupling import UnilateralCoupler
 from iapb.haptics.device import SimulatedDevice
+from iapb.haptics.rendering import read_device
 from iapb.mechanics.mechanism import Mechanism
 from iapb.mechanics.rotations import angles_of
-from iapb.numerics.compiled import Kernel, block, kinds_of
+from iapb.numerics.compiled import Entry, Kernel, block, kinds_of
 from iapb.numerics.linalg import product
 from iapb.numerics.schema import zeros_of
 from iapb.scene import scene_from_text
@@ -80,6 +81,9 @@ def _perform() -> None:
     simulation = Simulation(scene, coupling=GAINS, device=device)
     simulation.step()
     simulation.system.contacts_at(simulation.state.q)
+    held = Simulation(scene, coupling=GAINS)
+    held.follow(np.zeros((2, 3)), np.zeros((2, 3)))
+    Entry(read_device)(held.world, held.state, held.port, np.zeros(3), np.zeros(3))
     _impacts()
     _mechanics(simulation.system.mechanism)
 

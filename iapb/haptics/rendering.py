@@ -270,6 +270,17 @@ def move_device(world, state, port):
 
 
 @kernel
+def read_device(world, state, port, q, v):
+    """Take a reading of a device that the hand moves; the coupler engages for every one but the
+    first."""
+    copy_into(port.device_q, q)
+    copy_into(port.device_v, v)
+    if port.clock[0] > 0 and port.coupling == UNILATERAL:
+        engage(world, state, port)
+    port.clock[0] += 1
+
+
+@kernel
 def engage(world, state, port):
     """Engage the coupler if the tool touches a body or would at the device's pose; else move the
     tool to the device."""

@@ -11,6 +11,7 @@ from reports.figures import (  # noqa: F401
     film,
     hard_cases,
     paper,
+    port,
     stability,
     tilts,
 )

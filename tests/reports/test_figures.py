@@ -32,6 +32,7 @@ from verification.cost.accuracy import WAYS
 from verification.cost.calls import PRINTED
 from verification.cost.growth import FACTORED
 from verification.cost.trajectories import BELOW, OK, TIMED_OUT, WORLDS
+from verification.stability.port import COUPLINGS, EDGES
 from verification.stability.topic import contact_stability
 from verification.table import titled
 
@@ -39,7 +40,7 @@ MOST_SERIES = 6
 OF_WORLDS = {(look.color, look.marker): names for names, look in LOOKS[:7] if look.marker}
 SCENES = tuple(f"scene {k}" for k in range(6))
 CHECKS = {
-    "stability": contact_stability.checks,
+    "stability": [check for check in contact_stability.checks if check is not EDGES],
     "complementarity": [TWO_CONTACTS, LANDINGS],
 }
 METHODS = (*WORLDS, "MuJoCo")
@@ -184,6 +185,14 @@ def tables():
                 for m, scene in enumerate(SCENES)
                 for k, method in enumerate(METHODS)
                 for h in (8.0, 2.0, 0.5, 0.1, 0.02)
+            ),
+        ),
+        "stability/edges": (
+            "law; damping [N s/m]; friction [N]",
+            (
+                (law, 0.5 * n, max(0.0, 5.0 + k - 0.5 * n))
+                for k, law in enumerate(name for name in COUPLINGS if "," not in name)
+                for n in range(20)
             ),
         ),
         "work_precision": (

@@ -74,7 +74,7 @@ def test_ctrl_c_tells_what_was_judged_until_then_and_stores_a_run_that_breaks_a_
     assert read_run(tmp_path / "out/runs/trajectories-seed0-7.h5").steps == 20
 
 
-@pytest.mark.parametrize("part", ["truncation", "hand_port", TRAJECTORIES])
+@pytest.mark.parametrize("part", ["truncation", "device_limits", TRAJECTORIES])
 def test_a_case_that_is_no_impact_of_a_resolver_is_drawn_again_by_its_test(part):
     subject = subject_of(resolve_impact, seed=3)
     case = drawn(part, 5, subject)

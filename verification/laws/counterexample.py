@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import groupby
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from verification.laws.resolver import Resolver, ResolverFault, answer_of
 # the search prefers counterexamples with a residual above this, which rounding cannot explain
 NOTABLE = 1e-6
 HANGS = "gave no"  # kind of the fault of a call that takes too long
+Shrinks = TypeVar("Shrinks")
 _DIGITS = (0, 1, 2, 4, 8)
 
 
@@ -61,9 +62,7 @@ class Counterexample:
         return title
 
 
-def residual_of(
-    law: Law, case: ImpactCase, resolver: Resolver, bounds: Bounds
-) -> tuple[LawResidual | None, str]:
+def residual_of(law: Law, case: Any, resolver: Any, bounds: Any) -> tuple[LawResidual | None, str]:
     """Return the law's residual and ""; if the answer is unusable, an infinite residual and the
     resolver's fault."""
     try:
@@ -213,7 +212,11 @@ def _size(case: ImpactCase) -> int:
     return case.coordinates + case.contacts
 
 
-def shrink(case: ImpactCase, fails: Callable[[ImpactCase], bool]) -> ImpactCase:
+def shrink(
+    case: Shrinks,
+    fails: Callable[[Shrinks], bool],
+    smaller_of: Callable[[Shrinks], Iterator[Shrinks]] | None = None,
+) -> Shrinks:
     """Return a smaller case that still fails, greedily; the case itself if nothing smaller does.
 
     The search ends, because each step removes the translations, a row, a coordinate, a restitution
@@ -222,11 +225,15 @@ def shrink(case: ImpactCase, fails: Callable[[ImpactCase], bool]) -> ImpactCase:
     improved = True
     while improved:
         improved = False
-        for smaller in _smaller(case):
-            if _is_valid(smaller) and fails(smaller):
+        for smaller in (smaller_of or _valid)(case):
+            if fails(smaller):
                 case, improved = smaller, True
                 break
     return case
+
+
+def _valid(case: Any) -> Iterator[Any]:
+    return filter(_is_valid, _smaller(case))
 
 
 def _smaller(case: ImpactCase) -> Iterator[ImpactCase]:
@@ -275,11 +282,11 @@ def _rounded(case: ImpactCase, name: str, digits: int) -> Iterator[ImpactCase]:
     if array is None:
         return
     rounder = np.round(array, digits) + 0.0  # no −0.0
-    if _length(rounder) < _length(array):
+    if text_length(rounder) < text_length(array):
         yield replace(case, **{name: rounder})
 
 
-def _length(array: np.ndarray) -> int:
+def text_length(array: np.ndarray) -> int:
     """Length of the array as text; each rounding must reduce it, so that shrinking ends."""
     return sum(len(repr(float(x))) for x in array.ravel())
 
@@ -345,7 +352,7 @@ def as_test(
         "",
         f"def test_{law}():",
         *_repeating(earlier),
-        *(f"    {key} = {_written(array)}" for key, array in (arrays | optional).items()),
+        *(f"    {key} = {written(array)}" for key, array in (arrays | optional).items()),
         f"    case = ImpactCase(mass_matrix, contact_jacobian, velocity, {case.restitution!r}{more})",
         f"    residual = {table}[{law!r}].check(case, {called}, {tolerances})",
     ]
@@ -363,7 +370,7 @@ def _repeating(earlier: Sequence[bytes]) -> Iterator[str]:
             indent = 2 * indent
         yield f"{indent}resolver("
         for value in pickle.loads(pickled):
-            text = _written(value) if isinstance(value, np.ndarray) else repr(value)
+            text = written(value) if isinstance(value, np.ndarray) else repr(value)
             yield f"{indent}    {text},"
         yield f"{indent})"
 
@@ -393,7 +400,7 @@ def name_of(resolver: Any, word: str = "") -> str:
     return getattr(resolver, "__qualname__", None) or repr(resolver)
 
 
-def _written(array: np.ndarray) -> str:
+def written(array: np.ndarray) -> str:
     """The array as source code; an empty array also needs its shape."""
     text = f"np.array({array.tolist()!r}, dtype=float)"
     return text if array.size else f"{text}.reshape({array.shape})"

@@ -1,5 +1,4 @@
-"""Laws that need more than an impact resolver: a row budget, device limits, a wall or a device held
-by the hand, inputs of any size.
+"""Laws that need more than an impact resolver: a row budget, device limits, inputs of any size.
 
 Each law draws its own cases and judges its own kind of subject; the last name in `@law` is the
 engine's subject. To add a law, write its functions here, and add a planted fault to `planted`.
@@ -16,20 +15,12 @@ import numpy as np
 
 from iapb import resolve_impact
 from iapb.contact.kernels.collide import largest_share
-from iapb.contact.kernels.resting import normal_force
 from iapb.errors import IapbError
 from iapb.run import Run
 from verification.impacts import EPS, Floats, ImpactCase, draw_case, draw_extreme_case
 from verification.laws.bounds import FACTORED, KIT, Found, Law, LawCount, law, relative_gain
 from verification.laws.resolver import Resolver, outcome
 from verification.laws.scenes import ROOM, SceneCase, Values, draw_scene
-from verification.stability.device_port import (
-    COUPLER_WORLD,
-    RADIUS,
-    DeviceLoop,
-    actuator_forces,
-    leaked,
-)
 
 ENGINE_LAWS: dict[str, Law] = {}  # the seeds of random cases depend on the order: add at the end
 
@@ -221,123 +212,6 @@ def _first_difference(together: Run, apart: Run, of: slice) -> float:
     return float(np.max(np.abs(a - b)) / np.max(np.abs(b)))
 
 
-# Passivity observer at the hand's port of a sampled wall (paper section VII, claim C20).
-#
-# The hand moves a device with physical damping b along x(t). The device's position is read every T
-# seconds, and the wall's force F = K x_k + B (x_k − x_{k−1})/T (resisting, x > 0 inside, never
-# pulling) is held until the next reading. Among all motions through the same readings, uniform
-# motion between them dissipates least in b, namely b (Δx)²/T per step. Every motion therefore
-# satisfies
-#
-#     E_n ≥ Σ F_k Δx_k + b Δx_k²/T ≥ (b − KT/2 − |B|) Σ Δx_k²/T.
-#
-# This uses the convexity of ½Kx² for the spring and 2|ab| ≤ a² + b² for the damper. Hence b ≥ KT/2
-# + |B| is sufficient; this is the condition of Colgate and Schenkel (J. Robotic Systems 14, 1997).
-# The inertia of the device stores energy but never creates any.
-Wall = Callable[
-    [float, float, float, float], float
-]  # (depth x [m], its rate [m/s], K, B) -> resisting force [N]
-
-
-@dataclass(frozen=True)
-class HeldDevice:
-    """A loop, the device's physical damping [N s/m], and the positions (n + 1,) [m] that the hand
-    imposes.
-
-    The loop of a wall alone has the wall's constants only, and its first position is 0.
-    """
-
-    loop: DeviceLoop
-    device_damping: float
-    positions: Floats
-
-    @property
-    def turnover(self) -> float:
-        """Energy exchanged with wall or coupler, and with the damper [J]."""
-        return (
-            (self.device_damping + self.loop.bound)
-            * float(np.sum(np.diff(self.positions) ** 2))
-            / self.loop.dt
-        )
-
-
-def draw_wall(rng: np.random.Generator) -> HeldDevice:
-    """Draw K and B over decades, T, b at or above the bound, and a motion from slow to half the
-    sampling rate."""
-    K, B = (
-        10.0 ** rng.uniform(1.0, 5.0),
-        float(rng.choice([0.0, 1.0])) * 10.0 ** rng.uniform(-1.0, 3.0),
-    )
-    dt = float(rng.choice([1.0 / 512.0, 1e-3, 1e-4]))
-    x = hand_motion(rng, int(rng.integers(50, 800)))
-    loop, margin = (
-        DeviceLoop("wall", K, B, dt),
-        float(rng.choice([1.0, 1.0, rng.uniform(1.0, 3.0)])),
-    )
-    return HeldDevice(loop, margin * loop.bound, x - x[0])
-
-
-def hand_motion(rng: np.random.Generator, n: int) -> Floats:
-    """Return readings of a sine up to half the sampling rate plus a random walk; both have random
-    amplitudes (mm)."""
-    k = np.arange(n + 1)
-    sine = np.sin(np.pi * rng.uniform(0.0, 1.0) * k + rng.uniform(0.0, 6.3)) + rng.uniform(
-        -1.0, 1.0
-    )
-    walk = np.cumsum(rng.normal(size=n + 1)) / np.sqrt(n)
-    return np.asarray(
-        1e-3 * 10.0 ** rng.uniform(-2.0, 1.0) * (rng.uniform() * sine + rng.uniform() * walk)
-    )
-
-
-def quickest_motion(
-    K: float, B: float, b: float, dt: float, steps: int = 4000, half: float = 5e-4
-) -> HeldDevice:
-    """Return the motion to which a sampled wall gives most energy.
-
-    The device enters the wall slowly, so deep that the wall always pushes. Then it moves back and
-    forth by `half` [m] at half the sampling rate.
-    """
-    depth = 2.0 * half + 4.0 * B * half / (K * dt)
-    entering = np.linspace(0.0, depth, steps // 4)
-    return HeldDevice(
-        DeviceLoop("wall", K, B, dt),
-        b,
-        np.concatenate([entering, depth + half * (-1.0) ** np.arange(steps)]),
-    )
-
-
-def penalty_wall(depth: float, rate: float, K: float, B: float) -> float:
-    """The engine's penalty force (5) [N] at one contact, clamped so that it never pulls."""
-    return float(normal_force(-depth, -rate, K, B, True)) if depth > 0.0 else 0.0
-
-
-def leak(case: HeldDevice, wall: Wall) -> float:
-    """Largest net energy [J] that the port has returned to the hand, for uniform motion between the
-    readings."""
-    x, loop = case.positions, case.loop
-    rate = np.concatenate([[0.0], np.diff(x) / loop.dt])[:-1]
-    force = [
-        wall(float(a), float(r), loop.stiffness, loop.damping)
-        for a, r in zip(x[:-1], rate, strict=True)
-    ]
-    return leaked(x, -np.array(force), case.device_damping, loop.dt)
-
-
-@law(
-    ENGINE_LAWS,
-    "hand_port",
-    "the hand gets no energy from a wall that meets Colgate's condition b ≥ KT/2 + |B|",
-    draw_wall,
-    penalty_wall,
-)
-def hand_port_is_passive(case: HeldDevice, subject: Wall) -> Found:
-    """Leak relative to the energy exchanged with wall and damper; the tolerance covers the rounding
-    of n sums."""
-    relative = leak(case, subject) / case.turnover if case.turnover > 0.0 else 0.0
-    return relative, 4.0 * len(case.positions) * EPS
-
-
 @law(
     ENGINE_LAWS,
     "extremes",
@@ -357,60 +231,6 @@ def finite_or_named(case: ImpactCase, subject: Resolver) -> Found:
     except Exception:  # any other exception breaks the law
         fine = False
     return 0.0 if fine else 1.0, 0.0
-
-
-# The same at the port of a whole device scene: a unilateral coupler to a tool on a rigid wall.
-# Assume that b ≥ K_cpl T/2 + B_cpl, that e = 0, that the sensors are ideal, and that the hand, once
-# in the wall, keeps the coupler pressing. Then no motion extracts energy from the loop of coupler,
-# tool, rigid contact and device, because the tool rests and the coupler acts as the wall above.
-# `verification.stability.device_port` measures the other cases.
-HELD_STEPS, WAY = (
-    150,
-    10,
-)  # steps of the motion; how much slower the entry is, so that its damping adds little energy
-
-
-def draw_held_device(rng: np.random.Generator) -> HeldDevice:
-    """Draw gains and masses over decades, b at or above the bound, and a slow entry followed by any
-    pressing motion."""
-    dt = float(rng.choice([1.0 / 512.0, 1e-3]))
-    stiffness = 10.0 ** rng.uniform(1.0, 5.0)
-    damping = float(rng.choice([0.0, 1.0])) * stiffness * dt * rng.uniform(0.0, 2.0)
-    motion = hand_motion(rng, HELD_STEPS)
-    quickest = float(np.max(np.abs(np.diff(motion))))
-    motion += damping / stiffness * quickest / dt - float(
-        np.min(motion)
-    )  # K z + B ż >= 0: it presses
-    clearance = quickest / WAY
-    way = np.linspace(
-        -clearance, motion[0], int(WAY * (motion[0] + clearance) / quickest) + 1, endpoint=False
-    )
-    loop = DeviceLoop(
-        COUPLER_WORLD, stiffness, damping, dt, 10.0 ** rng.uniform(-1.0, 1.0), clearance
-    )
-    margin = float(rng.choice([1.0, 1.0, rng.uniform(1.0, 3.0)]))
-    return HeldDevice(loop, margin * loop.bound, np.concatenate([way, motion]))
-
-
-@law(
-    ENGINE_LAWS,
-    "device_port",
-    "the hand gets no energy from a coupler that meets Colgate's condition, if the tool is pressed on a rigid wall",
-    draw_held_device,
-    actuator_forces,
-)
-def device_port_is_passive(
-    case: HeldDevice, subject: Callable[[DeviceLoop, Floats], Floats]
-) -> Found:
-    """Leak relative to the energy exchanged with coupler and damper.
-
-    The tolerance covers the rounding of n sums and of the coupler's extension, which is a
-    difference of two positions.
-    """
-    x = case.positions
-    out = leaked(x, subject(case.loop, x), case.device_damping, case.loop.dt)
-    places = RADIUS / float(np.sqrt(np.mean(np.diff(x) ** 2)))
-    return out / case.turnover, 4.0 * len(x) * EPS * (1.0 + places)
 
 
 def judge_engine_law(

@@ -50,16 +50,14 @@ _SHARE = {
     "truncation": 0.05,
     "device_limits": 0.05,
     "extremes": 0.1,
-    "hand_port": 0.02,
 }
-_PER_TRAJECTORY = {IN_SPACE: 0.4, "group_splitting": 0.2, "device_port": 0.1}
+_PER_TRAJECTORY = {IN_SPACE: 0.4, "group_splitting": 0.2}
 BATCH = {
     IMPACTS: 4000,
     UNEQUAL: 4000,
     TRAJECTORIES: 50,
     IN_SPACE: 50,
     "group_splitting": 20,
-    "device_port": 20,
 }
 _BATCH = 2000
 ENGINE_CONDITION = 1e10  # largest κ(M) in tests of the engine

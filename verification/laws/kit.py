@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from importlib.util import find_spec
 from inspect import signature
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -130,10 +130,54 @@ class LawVerdict(LawCount):
             self._smallest, self.smallest_case = size, case
 
 
+class Report(str):
+    """Report of a check. It is a string with its own text, because pytest shortens other assert
+    messages."""
+
+    verdicts: tuple[Any, ...]
+    unfinished: str
+
+    def __new__(cls, *fields: Any, **named: Any) -> Self:
+        """Make the string from the text of the fields."""
+        draft = str.__new__(cls)
+        draft.__init__(*fields, **named)  # type: ignore[misc]
+        return str.__new__(cls, draft._text())
+
+    def __getnewargs__(self) -> tuple[Any, ...]:
+        """Arguments that recreate the report in another process."""
+        return tuple(getattr(self, one.name) for one in fields(self))  # type: ignore[arg-type]
+
+    __repr__ = __str__ = str.__str__
+
+    @property
+    def passed(self) -> bool:
+        """Whether every law holds on every requested case."""
+        return not self.unfinished and all(verdict.passed for verdict in self.verdicts)
+
+    @property
+    def broken_laws(self) -> tuple[str, ...]:
+        """Names of the laws that some case broke."""
+        return tuple(verdict.law for verdict in self.verdicts if not verdict.passed)
+
+    def raise_if_broken(self) -> None:
+        """Raise the report as an error unless it passed; the message contains the
+        counterexample.
+
+        Raises
+        ------
+        AssertionError
+            A law is broken, or there was no time to try every case.
+        """
+        if not self.passed:
+            raise AssertionError(str(self))
+
+    def _text(self) -> str:
+        raise NotImplementedError
+
+
 @dataclass(frozen=True, eq=False)
-class PassivityReport(str):
-    """Report of `check_passivity`. It is a string with its own text, because pytest shortens other
-    assert messages.
+class PassivityReport(Report):
+    """Report of `check_passivity`.
 
     Attributes
     ----------
@@ -159,28 +203,6 @@ class PassivityReport(str):
     contract: str = "equality"
     call_limit: float = CALL_LIMIT
 
-    def __new__(cls, *fields: Any, **named: Any) -> PassivityReport:
-        """Make the string from the text of the fields."""
-        draft = str.__new__(cls)
-        draft.__init__(*fields, **named)  # type: ignore[misc]
-        return str.__new__(cls, draft._text())
-
-    def __getnewargs__(self) -> tuple[Any, ...]:
-        """Arguments that recreate the report in another process."""
-        return tuple(getattr(self, one.name) for one in fields(self))
-
-    __repr__ = __str__ = str.__str__
-
-    @property
-    def passed(self) -> bool:
-        """Whether every law holds on every requested impact."""
-        return not self.unfinished and all(verdict.passed for verdict in self.verdicts)
-
-    @property
-    def broken_laws(self) -> tuple[str, ...]:
-        """Names of the laws that some impact broke."""
-        return tuple(verdict.law for verdict in self.verdicts if not verdict.passed)
-
     @property
     def worst(self) -> LawVerdict:
         """The law with the largest value / tolerance."""
@@ -189,18 +211,6 @@ class PassivityReport(str):
     def verdict(self, law: str) -> LawVerdict:
         """The verdict on the law of that name."""
         return next(verdict for verdict in self.verdicts if verdict.law == law)
-
-    def raise_if_broken(self) -> None:
-        """Raise the report as an error unless it passed; the message contains M, J, v, e and the
-        returned velocity.
-
-        Raises
-        ------
-        AssertionError
-            A law is broken, or there was no time to try every impact.
-        """
-        if not self.passed:
-            raise AssertionError(str(self))
 
     @property
     def counterexample(self) -> ImpactCase | None:
@@ -428,6 +438,11 @@ def choose_laws(
     known = CONTRACTS[contract].laws | (UNEQUAL_LAWS if unequal_restitution else {})
     if laws is None:
         return {name: law for name, law in known.items() if name not in EXACT_LAWS}
+    return laws_named(known, laws)
+
+
+def laws_named(known: dict[str, Law], laws: Sequence[str]) -> dict[str, Law]:
+    """Return the laws of these names; an error lists the known ones."""
     if not isinstance(laws, Iterable):
         raise ArgumentError("laws", laws, "names of laws")
     names = [laws] if isinstance(laws, str) else list(laws)

@@ -13,7 +13,7 @@ import numpy as np
 from iapb.run import Run
 from iapb.system import System
 from verification.impacts import Floats, ImpactCase
-from verification.laws.engine import Wall, saturated
+from verification.laws.engine import saturated
 from verification.laws.resolver import (
     RANK_CUT,
     Resolver,
@@ -24,7 +24,6 @@ from verification.laws.resolver import (
 )
 from verification.laws.scenes import SceneCase
 from verification.laws.trajectories import TRAJECTORY_LAWS, Trajectory
-from verification.stability.device_port import DeviceLoop, actuator_forces
 
 
 class Fault(NamedTuple):
@@ -178,17 +177,6 @@ def not_orthogonal(M: Floats, J: Floats, v: Floats, e: float, budget: int) -> Fl
     return double_counted(M, J[:budget], v, e)
 
 
-def makes_late_wall() -> Wall:
-    """Returns a wall whose spring uses the previous reading of the depth."""
-    before = [0.0]
-
-    def late_wall(depth: float, rate: float, K: float, B: float) -> float:
-        late, before[0] = before[0], depth
-        return max(0.0, K * late + B * rate) if depth > 0.0 else 0.0
-
-    return late_wall
-
-
 def one_factor_for_all(case: SceneCase) -> Run:
     """Multiplies the velocities of all bodies by 0.999 for each impact, at the end of its step."""
     run = case.simulate()
@@ -197,17 +185,10 @@ def one_factor_for_all(case: SceneCase) -> Run:
     return replace(run, v=run.v * factor[:, None])
 
 
-def stiffer_coupler(loop: DeviceLoop, positions: Floats) -> Floats:
-    """Uses a coupler whose stiffness is 5 % above the stated one."""
-    return actuator_forces(replace(loop, stiffness=1.05 * loop.stiffness), positions)
-
-
 PLANTED_ENGINE_FAULTS: dict[str, Fault] = {
     "truncation": Fault("rows not made orthogonal", not_orthogonal),
     "device_limits": Fault("saturation, component by component", saturated),
     "group_splitting": Fault("one factor for all groups", one_factor_for_all),
-    "hand_port": Fault("a wall one reading late", makes_late_wall, remembers=True),
-    "device_port": Fault("a coupler stiffer than it says", stiffer_coupler),
     "extremes": Fault("plain numpy without checks", sound_resolver),
 }
 

@@ -54,7 +54,7 @@ def _impact_law(study: Study, name: str) -> Row:
 
 
 def _engine_law(study: Study, name: str) -> Row:
-    cases = SIMULATED if name in ("group_splitting", "device_port") else ENGINE_CASES
+    cases = SIMULATED if name == "group_splitting" else ENGINE_CASES
     count = engine.judge_engine_law(name, cases=cases, seed=SEED)
     fault = planted.PLANTED_ENGINE_FAULTS[name]
     with np.errstate(all="ignore"):  # the faulty subjects may overflow

@@ -10,8 +10,8 @@ import numpy as np
 
 from verification.check import Check, Study, Topic
 from verification.finding import Part
-from verification.stability.device_port import PORT
 from verification.stability.peg import PEG
+from verification.stability.port import EDGES, PORT, port_numbers
 from verification.stability.walls import (
     GRIDS,
     GROWS,
@@ -165,5 +165,6 @@ contact_stability = Topic(
     "and we measure the energy that it draws from the loop. Colgate's condition, b >= KT/2 + |B| "
     "with the period T, "
     "makes a wall of spring and damper passive for every hand, if the sensors are ideal.",
-    checks=(MAPS, DAMPINGS, HARDNESS, PEG, PORT),
+    checks=(MAPS, DAMPINGS, HARDNESS, PEG, PORT, EDGES),
+    numbers=port_numbers,
 )

@@ -18,8 +18,8 @@ BEST, WORST = {"IAPB": NEAR, "PB": FAR, "CBuc": FAR}, {"IAPB": FAR, "PB": NEAR, 
 BEST["part"] = WORST["part"] = ""
 PUSHED = BEST | {"part": f"{peg.NEARER}, x"}
 FILTERED = {"part": socket.BOTH, "false collisions without filters": 26, "false collisions": 1}
-LEAKS = {"energy from the wall": 1e-3, "wall's turnover": 1.0}
-TIGHT = {"energy from the wall": 0.0, "wall's turnover": 1.0}
+LEAKS = {"hand draws energy": True}
+TIGHT = {"hand draws energy": False}
 
 # claims -> a row, and what the rule says of it
 ROWS = [

@@ -1,0 +1,289 @@
+"""Thirty faults of force laws, each with the name of the law of the kit that finds it.
+
+The sound wall has K = 2000 N/m and B = 2 N s/m at 1 kHz, and needs 3 N s/m; the device has 2 % more.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+K, B = 2000.0, 2.0
+DAMPING = 3.06
+
+
+def wall(x, v, stiffness=K, damping=B):
+    return -max(stiffness * x + damping * v, 0.0) if x > 0.0 else 0.0
+
+
+def twice_the_damping(x, v):
+    return wall(x, v, damping=2.0 * B)
+
+
+def stiffer(x, v):
+    return wall(x, v, stiffness=1.1 * K)
+
+
+def step_at_the_surface(x, v):
+    return wall(x, v) - (0.2 if x > 0.0 else 0.0)
+
+
+def pushes_more_on_the_way_out(x, v):
+    return wall(x, v) * (1.1 if v < 0.0 else 1.0)
+
+
+def negative_friction(x, v):
+    return wall(x, v) + 0.05 * np.sign(v)
+
+
+def attracts(x, v):
+    return K * x
+
+
+def rounded_damping(x, v):
+    return wall(x, 0.0) - B * np.round(v, 1)
+
+
+def rounded_position(x, v):
+    return wall(np.round(x, 4), v)
+
+
+def pole(x, v):
+    return -1e-4 / (0.0101 - x) + 1e-4 / 0.0101 if x > 0.0 else 0.0
+
+
+def not_a_number_deep_inside(x, v):
+    return wall(x, v) if x < 0.006 else float("nan")
+
+
+def raises_deep_inside(x, v):
+    if x > 0.006:
+        raise ValueError("too deep")
+    return wall(x, v)
+
+
+def returns_nothing_outside(x, v):
+    return wall(x, v) if x > 0.0 else None
+
+
+def bias(x, v):
+    return wall(x, v) - 0.01
+
+
+class Late:
+    """One sample late."""
+
+    def reset(self):
+        self.last = 0.0
+
+    def step(self, x, v):
+        force, self.last = self.last, wall(x, v)
+        return force
+
+
+class Lagging:
+    """The force passes a filter of 5 ms."""
+
+    def reset(self, dt):
+        self.force, self.share = 0.0, dt / (5e-3 + dt)
+
+    def step(self, x, v):
+        self.force += self.share * (wall(x, v) - self.force)
+        return self.force
+
+
+class EverySecond:
+    """Renewed every second period."""
+
+    every = 2
+
+    def reset(self):
+        self.k, self.force = 0, 0.0
+
+    def step(self, x, v):
+        if self.k % self.every == 0:
+            self.force = wall(x, v)
+        self.k += 1
+        return self.force
+
+
+class EveryFifth(EverySecond):
+    every = 5
+
+
+class GainOfTheFilter:
+    """A filter of the velocity whose gain is 3."""
+
+    def reset(self, dt):
+        self.rate, self.share = 0.0, dt / (2e-4 + dt)
+
+    def step(self, x, v):
+        self.rate += self.share * (3.0 * v - self.rate)
+        return -K * x - B * self.rate
+
+
+class Integral:
+    """A controller with an integral term."""
+
+    def reset(self, dt):
+        self.sum, self.dt = 0.0, dt
+
+    def step(self, x, v):
+        self.sum += x * self.dt
+        return -K * x - 5e3 * self.sum
+
+
+class StifferAfterDeep:
+    """Stiffer on the way back from the deepest point."""
+
+    def reset(self):
+        self.deepest = 0.0
+
+    def step(self, x, v):
+        self.deepest = max(self.deepest, x)
+        return wall(x, v, stiffness=K * (1.2 if x < 0.8 * self.deepest else 1.0))
+
+
+class Vibrates:
+    """Vibrates at 100 Hz once the wall is touched."""
+
+    def reset(self, dt):
+        self.dt, self.k = dt, 0
+
+    def step(self, x, v):
+        self.k += x > 0.0
+        return wall(x, v) + 0.3 * np.sin(2.0 * np.pi * 100.0 * self.dt * self.k)
+
+
+class FreeTool:
+    """A tool of 0.1 kg that takes the hand's velocity for nothing, and hits the wall by a coupler."""
+
+    def reset(self, dt):
+        self.dt, self.at, self.rate = dt, 0.0, 0.0
+
+    def step(self, x, v):
+        if x <= 0.0:
+            self.at, self.rate = x, v
+            return 0.0
+        pull = 500.0 * (x - self.at)
+        self.rate += self.dt * (pull - (3e3 * self.at if self.at > 0.0 else 0.0)) / 0.1
+        self.at += self.dt * self.rate
+        return -pull
+
+
+class Drifts:
+    """Drifts with time."""
+
+    def reset(self):
+        self.k = 0
+
+    def step(self, x, v):
+        self.k += 1
+        return wall(x, v) * (1.0 + 1e-6 * self.k)
+
+
+class LosesASample:
+    """Gives no force at every 64th sample."""
+
+    def reset(self):
+        self.k = 0
+
+    def step(self, x, v):
+        self.k += 1
+        return wall(x, v) if self.k % 64 else 0.0
+
+
+class NoisyDamper:
+    """A damper with noise."""
+
+    rng = np.random.default_rng(0)
+
+    def reset(self):
+        pass
+
+    def step(self, x, v):
+        return wall(x, v) * (1.0 + 1e-9 * self.rng.normal())
+
+
+class NeverForgets:
+    """A warm start that the reset forgets to clear."""
+
+    last = 0.0
+
+    def reset(self):
+        pass
+
+    def step(self, x, v):
+        force = wall(x, v) + 1e-12 * NeverForgets.last
+        NeverForgets.last = force
+        return force
+
+
+class ImpulseAsForce:
+    """(1 + e) m v [N s] at the first sample inside, handed over as a force [N]."""
+
+    def reset(self):
+        self.inside = False
+
+    def step(self, x, v):
+        new, self.inside = x > 0.0 and not self.inside, x > 0.0
+        return -2.0 * v if new else 0.0
+
+
+def above_the_limit(x, v):
+    return wall(x, v)
+
+
+def changes_position(x, v):
+    x *= 1.0001
+    return -K * x
+
+
+def changes_velocity(x, v):
+    v[0] = 0.0
+    return -K * x
+
+
+CURL = np.array([[K, 50.0], [-50.0, K]])
+
+
+def curl(x, v):
+    return -CURL @ x
+
+
+def texture_in_a_fixed_direction(x, v):
+    return np.array([0.2 * np.sin(2000.0 * x[1]), 0.0])
+
+
+FAULTS = {
+    "energy": [
+        twice_the_damping,
+        stiffer,
+        step_at_the_surface,
+        pushes_more_on_the_way_out,
+        negative_friction,
+        attracts,
+        rounded_damping,
+        rounded_position,
+        pole,
+        Late,
+        Lagging,
+        EverySecond,
+        EveryFifth,
+        GainOfTheFilter,
+        Integral,
+        StifferAfterDeep,
+        Vibrates,
+        FreeTool,
+        curl,
+        texture_in_a_fixed_direction,
+    ],
+    "finite": [not_a_number_deep_inside, raises_deep_inside, returns_nothing_outside],
+    "silent": [bias],
+    "waiting": [Drifts, LosesASample],
+    "repeatable": [NoisyDamper, NeverForgets],
+    "tap": [ImpulseAsForce],
+    "bounded": [above_the_limit],
+    "arguments": [changes_position, changes_velocity],
+}
+IN_THE_PLANE = {curl, texture_in_a_fixed_direction, changes_position, changes_velocity}
+EVERY = [(law, fault) for law, faults in FAULTS.items() for fault in faults]

@@ -1,0 +1,127 @@
+"""check_force: its verdicts, its counterexamples as tests, its guards, and the planted faults."""
+
+import pickle
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from iapb.errors import ArgumentError
+from tests.verification.port.faults import DAMPING, EVERY, IN_THE_PLANE, wall
+from verification.port import BareDevice, check_force
+from verification.port.laws import FORCE_LAWS
+
+ROOT = Path(__file__).resolve().parents[3]
+QUICK = 0.2  # effort
+
+
+def checked(law, fault, effort=1.0):
+    start = [0.0, 0.0] if fault in IN_THE_PLANE else 0.0
+    limit = 15.0 if law == "bounded" else None
+    return check_force(fault, BareDevice(damping=DAMPING), start=start, limit=limit, effort=effort)
+
+
+def test_a_sound_wall_keeps_every_law():
+    report = check_force(wall, BareDevice(damping=DAMPING), limit=100.0, effort=QUICK, fastest=10.0)
+    assert report.passed and not report.broken_laws and "passed" in report
+    assert {one.law for one in report.verdicts} == set(FORCE_LAWS)
+    report.raise_if_broken()
+
+
+def test_a_wall_that_is_not_sound_names_a_motion_of_three_samples():
+    """In by 1 mm and back: the smallest motion that draws energy from a spring."""
+    report = check_force(wall, BareDevice(damping=0.5), effort=QUICK)
+    assert report.broken_laws == ("energy",) and len(report.found[0][1].positions) == 4
+    with pytest.raises(AssertionError, match="def test_energy"):
+        report.raise_if_broken()
+    assert str(pickle.loads(pickle.dumps(report))) == str(report)
+
+
+def test_the_same_seed_gives_the_same_answer_and_stored_energy_is_allowed():
+    one, other = (check_force(wall, BareDevice(damping=2.0), effort=QUICK) for _ in range(2))
+    assert one.damping_needed == other.damping_needed and one.calls == other.calls
+
+    def falls(x, v):
+        return 1.0 if abs(x) < 0.005 else 0.0
+
+    passes = check_force(falls, BareDevice(damping=1e3, friction=1.01), effort=QUICK)
+    assert passes.passed
+    energy = {"laws": ["energy", "silent"], "effort": QUICK}
+    assert not check_force(falls, BareDevice(damping=0.1), **energy).passed
+    assert check_force(falls, BareDevice(damping=2000.0, friction=0.6), stored=0.1, **energy).passed
+
+
+def test_slow_hands_need_less_of_a_damper():
+    """Re[(1 − z⁻¹) H]/(1 − cos θ) of K + B (1 − z⁻¹)/T falls from KT/2 + B at π to KT/2 − B at 0."""
+    report = check_force(wall, BareDevice(), fastest=250.0, laws=["energy"], effort=QUICK)
+    theta = 2.0 * np.pi * 0.25
+    need = 1.0 - 2.0 * np.cos(theta)
+    assert 0.97 * need < report.slow_damping < 1.001 * need < report.damping_needed
+
+
+@pytest.mark.parametrize(("law", "fault"), [EVERY[k] for k in (0, 2, 20, 23, 24, 26, 28, 29)])
+def test_a_planted_fault_is_found_by_its_name(law, fault):
+    assert law in checked(law, fault, QUICK).broken_laws
+
+
+@pytest.mark.thorough
+def test_every_planted_fault_is_found_and_its_test_fails_in_a_fresh_process(tmp_path):
+    missed, tests = [], []
+    for k, (law, fault) in enumerate(EVERY):
+        report = checked(law, fault)
+        found = [one for one in report.found if one[0] == law]
+        missed += [] if found else [fault.__name__]
+        tests += [report.test_of(*one[:2]).replace("def test_", f"def test_{k}_") for one in found]
+    assert not missed
+    for number, text in enumerate(tests):
+        (tmp_path / f"test_{number}.py").write_text(text)
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(tmp_path)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert f"{len(EVERY)} failed" in done.stdout and "passed" not in done.stdout, done.stdout[
+        -2000:
+    ]
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("seed", range(10))
+def test_a_sound_wall_never_alarms(seed):
+    assert check_force(wall, BareDevice(damping=1.02 * 3.0), seed=seed, effort=QUICK).passed
+
+
+def test_a_law_that_hangs_is_ended_in_a_process_of_its_own():
+    def hangs(x, v):
+        if x > 0.002:
+            time.sleep(60.0)
+        return 0.0
+
+    began = time.monotonic()
+    options = {"own_process": True, "call_limit": 0.3, "effort": QUICK}
+    report = check_force(hangs, BareDevice(damping=1.0), **options)
+    assert time.monotonic() - began < 20.0  # one call of 60 s would take longer
+    assert report.broken_laws == ("finite",) and "gave no answer" in report
+
+
+def test_patience_ends_the_search_and_the_report_says_so():
+    report = check_force(wall, BareDevice(damping=DAMPING), patience=0.0)
+    assert not report.passed and "NOT FINISHED" in report and "too slow" in report
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"laws": ["energi"]}, {"start": [0.0] * 4}, {"start": float("nan")}]
+)
+def test_wrong_arguments_are_refused(wrong):
+    with pytest.raises(ArgumentError):
+        check_force(wall, BareDevice(), **wrong)
+    with pytest.raises(ArgumentError):
+        check_force(3.0, BareDevice())
+
+
+def test_the_edge_is_convex_and_passes_through_what_is_needed():
+    report = check_force(wall, BareDevice(), laws=["energy"], edge=True, effort=QUICK)
+    b, f = report.edge.T
+    assert np.all(np.diff(f, 2) >= -1e-9 * f[0])  # convex, up to rounding
+    at_zero = b[np.argmax(f <= 1e-6 * f[0])]
+    assert abs(at_zero - 3.0) < 0.1  # the grid of 200 points up to 6

@@ -1,0 +1,38 @@
+"""Time-domain passivity control of a wall: B. Hannaford, J.-H. Ryu, "Time-domain passivity control of
+haptic interfaces", IEEE Transactions on Robotics and Automation 18(1), 2002.
+
+The observer sums the energy that the force gave in each period, from the motion that the next sample
+shows: J.-H. Ryu and others, "Sampled- and continuous-time passivity and stability of virtual
+environments", IEEE Transactions on Robotics 20(4), 2004. If the sum is negative, a damper shall take
+back what is missing. It acts one period after the motion that sizes it, so a quick move after a
+slow one draws more than was missing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass
+class PassivityControl:
+    """The controller of section III of Hannaford and Ryu, around a wall with `step(x, v)`.
+
+    most : largest damping of the controller [N s/m].
+    """
+
+    wall: Any
+    most: float = 20.0
+
+    def reset(self, dt: float) -> None:
+        """Forget the energy."""
+        self.dt, self.taken, self.force = dt, 0.0, 0.0
+
+    def step(self, x: float, v: float) -> float:
+        """Return the force on the hand [N]."""
+        self.taken -= self.force * v * self.dt
+        damping = 0.0
+        if self.taken < 0.0 and v != 0.0:
+            damping = min(-self.taken / (self.dt * v * v), self.most)
+        self.force = self.wall.step(x, v) - damping * v
+        return self.force

@@ -1,0 +1,21 @@
+"""A wall of spring and damper that only pushes: equation (5) of the paper, clamped.
+
+Its need is KT/2 + B: J. E. Colgate, G. Schenkel, "Passivity of a class of sampled-data systems",
+Journal of Robotic Systems 14(1), 1997.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class PenaltyWall:
+    """F = −max(K x + B v, 0) inside the wall, x > 0 [m]."""
+
+    stiffness: float
+    damping: float = 0.0
+
+    def step(self, x: float, v: float) -> float:
+        """Return the force on the hand [N]."""
+        return -max(self.stiffness * x + self.damping * v, 0.0) if x > 0.0 else 0.0

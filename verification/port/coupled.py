@@ -1,0 +1,113 @@
+"""Our own coupled loop as a force law: coupling, tool, contacts and actuators of a scene in a world,
+in the engine.
+
+The hand moves the device along the first coordinates of the tool; the others stay at the start.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from iapb.scene import Scene, find_scene, load_scene, scene_from_text
+from iapb.simulation import Simulation
+from reference import Floats
+from reference.worlds import find_world
+
+COORDINATION = (100.0, 70.0)  # Table I: K_coord [N/m], B_coord [N s/m]
+COUPLER_WORLD = "CBuc"
+RADIUS = 0.01  # [m] of the tool of `wall_scene`
+CLEARANCE = 1e-3  # [m] between that tool and the wall, at the start
+
+
+@dataclass
+class CoupledLoop:
+    """A scene in a world, as an object with `follow(x, v)`.
+
+    rendering : of impulses beyond the scene's limits of force: full, saturate, scale, spread.
+    """
+
+    scene: Scene | str | Path
+    world: str
+    rendering: str = "full"
+
+    @cached_property
+    def simulation(self) -> Simulation:
+        """The simulation that every motion uses again."""
+        scene = self.scene
+        if not isinstance(scene, Scene):
+            scene = load_scene(find_scene(scene))
+        world = find_world(self.world, self.rendering)
+        return Simulation(scene, world.law, world.coupling_in(scene))
+
+    @property
+    def rate(self) -> float:
+        """Samples per second [Hz]; the device must have the same."""
+        return float(self.simulation.scene.rate)
+
+    def start(self, size: int) -> Floats:
+        """The tool's first coordinates at the start (size,)."""
+        return self.simulation.port.device_q[:size].copy()
+
+    def follow(self, x: Floats, v: Floats) -> Floats:
+        """Return the actuator forces (n, d) at readings (n, d) from the scene's start."""
+        port, (n, d) = self.simulation.port, x.shape
+        q, rate = np.tile(self._at_start, (n, 1)), np.zeros((n, len(port.device_v)))
+        q[:, :d], rate[:, :d] = x, v
+        return self.simulation.follow(q, rate)[:, :d]
+
+    @cached_property
+    def _at_start(self) -> Floats:
+        return np.array(self.simulation.port.device_q)
+
+    def __getstate__(self) -> dict[str, object]:
+        """Leave the compiled state out; it is made again."""
+        return {"scene": self.scene, "world": self.world, "rendering": self.rendering}
+
+
+def wall_scene(
+    world: str,
+    stiffness: float,
+    damping: float,
+    rate: float = 512.0,
+    mass: float = 2.0,
+    limit: float | None = None,
+) -> Scene:
+    """Return a disc that slides along x to a wall at x = 0, with e = 0 and the gains of Table I.
+
+    stiffness, damping : of the coupler in CBuc, else of the wall; limit : of the device's force [N].
+    """
+    own = [stiffness, damping]
+    wall = {"stiffness": stiffness, "damping": damping} if world != COUPLER_WORLD else {}
+    tool = {
+        "name": "tool",
+        "joint": "prismatic",
+        "axis": [1, 0],
+        "mass": mass,
+        "shapes": [{"kind": "circle", "radius": RADIUS}],
+        "position": [-RADIUS - CLEARANCE],
+    }
+    return scene_from_text(
+        json.dumps(
+            {
+                "name": "device_loop",
+                "rate": rate,
+                "duration": 1.0,
+                "bodies": [tool],
+                "walls": [
+                    {"name": "wall", "kind": "half_plane", "point": [0, 0], "normal": [-1, 0]}
+                ],
+                "contact": {"forces": "paper", "restitution": 0.0, **wall},
+                "device": {} if limit is None else {"force_limit": [limit]},
+                "couplings": {
+                    "four_channel": {"stiffness": COORDINATION[:1], "damping": COORDINATION[1:]},
+                    "unilateral": {"stiffness": own[:1], "damping": own[1:]},
+                },
+                "hand": {"body": "tool", "force": [0, 0, 0]},
+            }
+        )
+    )
