@@ -34,6 +34,15 @@ _TITLES = {"A": "A: posts far apart, both push", "B": "B: posts close, the formu
 _THICK, _FLOOR, _LONG = 0.09, -0.55, 0.42  # of the bar, below it, of the longest arrow [m]
 _BORDER = ("cosine", "speed ratio", "agreement predicted", "agreement found")
 _WIDEST = 9.0  # [em] of the longest bar
+_KINDS = {
+    "cradle": "balls in a row",
+    "obtuse normals": "no push moves another contact (c ≤ 0)",
+    "face on floor": "face of a box on the floor",
+    "corner": "box in a corner",
+    "tight hole": "peg in a tight hole",
+    "random rows": "random contacts",
+    "with a neighbour": "random contacts, one more touching",
+}
 
 
 @recipe("condition", "complementarity/landings", "complementarity/two contacts")
@@ -104,7 +113,7 @@ def _bar(height: float, angle: float, about: float = 0.0) -> tuple[list[float], 
 def _tilted(axes: Any, post: float, ratio: float) -> None:
     """Draw the bar a moment after impulses that only push: its right end flies up."""
     axes.fill(*_bar(0.0, 0.16, -post), fill=False, edgecolor=MUTED, linestyle="--", linewidth=1.0)
-    note(axes, (0.72, 0.47), "pushing only:\nthis end flies up", fontsize=8.5, color=MUTED)
+    note(axes, (1.08, 0.62), "pushing only:\nthis end flies up", fontsize=8.5, color=MUTED)
 
 
 def _impulse(axes: Any, place: float, impulse: float, most: float) -> None:
@@ -154,7 +163,7 @@ def how_often(numbers: Table) -> Drawn:
         rows = sorted(
             numbers.where(kind=kind).records(), key=lambda row: float(-row["agree"] / row["cases"])
         )
-        lines = {row["impacts"].replace("_", " "): _cells(row, most) for row in rows}
+        lines = {_name(row["impacts"]): _cells(row, most) for row in rows}
         table = grid(("same", "differ", "impacts", "same [%]"), lines, "plain bars")
         panels.append(Panel(table, f"{title}: how many agree.", title))
     return Drawn(
@@ -162,6 +171,10 @@ def how_often(numbers: Table) -> Drawn:
         numbers,
         {"same velocity": _square(GREEN), "differ: an impulse must pull": _square(FORCE)},
     )
+
+
+def _name(kind: str) -> str:
+    return _KINDS.get(kind, kind.replace("_", " "))
 
 
 def _cells(row: Row, most: int) -> list[Markup]:

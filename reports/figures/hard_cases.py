@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 from markupsafe import Markup
 
 from reports.figures.figure import Drawn, Panel, cell, grid, recipe
+from reports.figures.numbers import power_of_ten
 from reports.figures.plot import Plot, note
 from reports.figures.style import FORCE, GREEN, MUTED, STYLES, LineStyle
 from verification.hard_cases.topic import ENGINE, IMPACT, MOTION
@@ -84,7 +86,7 @@ def _map_of(rows: Rows) -> str:
         key=lambda case: _rank(outcomes[case]),
     )
     lines: dict[str, Sequence[Markup]] = {
-        case: [_cell(outcomes[case].get(method, "not tried")) for method in methods]
+        _in_powers(case): [_cell(outcomes[case].get(method, "not tried")) for method in methods]
         for case in hard
     }
     easy = [found for case, found in outcomes.items() if case not in hard]
@@ -94,6 +96,11 @@ def _map_of(rows: Rows) -> str:
     ]
     lines["right, of all tried"] = [cell(_counted(rows, method)) for method in methods]
     return grid([WORDS.get(method, method) for method in methods], lines, "narrow")
+
+
+def _in_powers(words: str) -> str:
+    """Return the words with 1e-6 as 10⁻⁶."""
+    return re.sub(r"\b1e-?\d+", lambda found: power_of_ten(float(found[0])), words)
 
 
 def _cell(outcome: str) -> Markup:

@@ -65,7 +65,7 @@ def _with_a_fault(case: AnyCase, method: str, size: float) -> str:
     for wrong in judge.faulty_answers(case, answer.velocity):
         with pytest.MonkeyPatch.context() as patch:
             faulty = answer._replace(velocity=answer.velocity + size * wrong)
-            patch.setattr(judge, "_answer", lambda *_, faulty=faulty: faulty)
+            patch.setattr(judge, "resolve_once", lambda *_, faulty=faulty: faulty)
             verdicts.append(judged(case, method)["outcome"])
     return "stable" if "stable" in verdicts else verdicts[0]
 
