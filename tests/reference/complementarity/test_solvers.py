@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 from iapb.errors import ArgumentError, SolverError
 from reference.complementarity import SOLVERS, ImpactProblem, Solution, solve, solver_names
 from reference.complementarity.benchmark import run_solvers
-from reference.complementarity.solution import project_on_cone
+from reference.complementarity.solution import project_on_cone, residuals
 from reference.complementarity.solvers import SolverEntry
 from reference.complementarity.solvers.enumeration import all_solutions
 
@@ -294,3 +294,19 @@ def test_opposed_contacts_whose_velocities_are_rounding_have_an_answer(name: str
             ImpactProblem.from_impact(np.diag([1.0, 2.0, 0.1, 3.0]), rows, v, 0.5), name
         )
         assert np.abs(solution.velocity_plus - v).max() <= 1e-14
+
+
+@pytest.mark.parametrize(
+    ("impulse", "expected"),
+    [
+        (0.0, (0.0, 1.0, 0.0, 1.0)),  # the contact still closes
+        (-1.0, (1.0, 2.0, 2.0, 2.0)),  # it pulls
+        (2.0, (0.0, 0.0, 1.0, 1.0)),  # it pushes while it opens
+        (1.0, (0.0, 0.0, 0.0, 0.0)),
+    ],
+)
+def test_each_residual_says_what_is_wrong(impulse: float, expected: tuple[float, ...]) -> None:
+    """W = 1, b = −1: cone of the impulse, cone of the velocity, complementarity, natural map."""
+    found = residuals(ImpactProblem.from_delassus(np.eye(1), [-1.0]), np.array([impulse]))
+    names = ("impulse_cone", "velocity_cone", "complementarity", "natural_map")
+    assert tuple(getattr(found, name) for name in names) == expected
