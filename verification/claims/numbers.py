@@ -304,8 +304,10 @@ def left_open(claims: Claims) -> Iterator[dict[str, Any]]:
             }
     if "C10" in claims:
         table = claims["C10"].tables["C10"].where(part=f"{peg.NEARER}, {peg.ALL_THREE}")
-        for tilt in sorted(set(table["tilt"])):
+        for tilt in TILTS["quick"]:
             rows = table.where(tilt=tilt).records()
+            if not rows:
+                continue
             yield {
                 "left open": "tilt of the start",
                 "value": degrees(tilt),
