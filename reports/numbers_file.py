@@ -11,10 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from iapb.errors import ArgumentError, RunFileError
-from reports.figures.figure import Figure
+from reports.figures.figure import Figure, numbers_of, statements
 from reports.pages.records import Evidence
 from reports.store.io import write_whole
 from reports.store.keys import plain
+from verification.numbers import value_tables
 from verification.table import Table, titled
 
 NUMBERS_NAME = "numbers.json"
@@ -43,12 +44,16 @@ class ReportNumbers:
 def collect_numbers(evidence: Evidence, figures: Iterable[Figure], depth: str) -> ReportNumbers:
     """Return every table and judged sentence of a report, each once, and the content hashes of its
     runs."""
-    tables = dict(_of_evidence(evidence))
+    tables, figures = dict(_of_evidence(evidence)), tuple(figures)
     for figure in figures:
         if figure.numbers is not None and all(
             figure.numbers is not table for table in tables.values()
         ):
             tables[f"figures/{figure.key}"] = figure.numbers
+    tables["figures/statements"] = statements(figures)
+    tables |= {
+        f"figures/{name}": table for name, table in value_tables(numbers_of(figures)).items()
+    }
     runs = {run.command: run.content_hash for run in evidence.runs}
     return ReportNumbers(tables, runs, dict(evidence.provenance), depth)
 

@@ -18,7 +18,7 @@ from typing import TypeVar
 import numpy as np
 
 from reference.one_thread import one_thread
-from verification.finding import REFUTED, REPRODUCED, Failure, Part, attempt
+from verification.finding import Failure, attempt
 
 Key = TypeVar("Key")
 Result = TypeVar("Result")
@@ -77,57 +77,6 @@ class Times:
         return Times(
             tuple(ours / theirs for ours, theirs in zip(self.samples, other.samples, strict=True))
         )
-
-
-TIMES = ("time", "lower quartile", "upper quartile")  # the columns of `time_cells`
-
-
-def time_cells(times: Times) -> dict[str, float]:
-    """Return the median and the quartiles in microseconds."""
-    values = (times.median, times.lower, times.upper)
-    return {f"{name} [µs]": 1e6 * value for name, value in zip(TIMES, values, strict=True)}
-
-
-def target(
-    asked: str, measured: str, wanted: str, met: bool, miss: str = "", *, timed: bool = True
-) -> Part:
-    """Return a part on a target; `miss` is the text for the first page if the target is missed."""
-    return Part.of(
-        asked,
-        measured,
-        wanted,
-        REPRODUCED if met else REFUTED,
-        timed=timed,
-        miss="" if met else miss,
-    )
-
-
-def limited(
-    what: str,
-    value: float,
-    limit: float,
-    unit: str = "",
-    more: str = "",
-    *,
-    least: bool = False,
-    timed: bool = True,
-) -> Part:
-    """Return a part on a value that should be at most (`least`: at least) the limit; `what` begins
-    its sentence."""
-    told, met = f"{what} {value:.3g}{unit}", value >= limit if least else value <= limit
-    wanted, asked = (
-        f"at {'least' if least else 'most'} {limit:g}{unit}",
-        f"{what[0].upper()}{what[1:]}",
-    )
-    return Part(
-        f"{asked} {value:.3g}{unit}{more}. Target: {wanted}.",
-        REPRODUCED if met else REFUTED,
-        timed=timed,
-        miss="" if met else f"{told} (our own target: {wanted.removesuffix(unit)})",
-        asked=asked,
-        measured=f"{value:.3g}{unit}{more}",
-        target=wanted,
-    )
 
 
 def timed(work: Callable[[], Result]) -> tuple[Result, float]:

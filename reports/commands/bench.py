@@ -13,11 +13,12 @@ import typer
 from iapb.errors import ArgumentError
 from reports.provenance import processor
 from reports.show import Answer, Json, sentence, stage_progress
-from verification.cost.accuracy import choices, short_time, which_method, work_precision
-from verification.finding import MIXED, NOT_COMPUTED, REPRODUCED
+from verification.cost.accuracy import recommended, short_time, which_method, work_precision
+from verification.finding import NOT_COMPUTED, NOT_TESTABLE, REFUTED, REPRODUCED, Part
 from verification.haptic_rate import haptic_study
 
-LONG = ("motions", "solvers", "budgets", "scaling", "robots")  # tables that --json alone has
+# tables that --json alone has
+LONG = ("motions", "C19", "C22", "budgets", "robots", "our time over theirs")
 
 
 def bench(
@@ -48,20 +49,30 @@ def bench(
         | {"methods on problems": methods.records()},
     }
     shown = {name: table for name, table in topic.tables.items() if name not in LONG}
-    shown["which method for a budget"] = choices(methods)
+    shown["which method for a size"] = recommended(methods)
     lines = [
         line
         for name, table in shown.items()
         for line in (f"\n{name.capitalize()}", table, sentence(table.note))
     ]
-    words = {REPRODUCED: "as asked for", MIXED: "not as asked for", NOT_COMPUTED: "not measured"}
-    lines += [
-        "",
-        *(sentence(f"{words[part.verdict]}: {part.sentence}", "• ") for part in topic.parts),
-    ]
+    lines += ["", *map(_target, topic.parts)]
     lines.append(f"Further tables with --json: {', '.join((*LONG, 'methods on problems'))}.")
     lines += [f"Not computed: {one.case}: {one.error}: {one.reason}" for one in topic.failures]
     return Answer(facts, lines, 1 if topic.failures else 0)
+
+
+def _target(part: Part) -> str:
+    """Return a line on a target: met or missed, and the number."""
+    words = {
+        REPRODUCED: "met",
+        REFUTED: "missed",
+        NOT_TESTABLE: "no value",
+        NOT_COMPUTED: "not measured",
+    }
+    if part.value is None:
+        return f"{words[part.verdict]}: {part.name}"
+    wanted = f"{'at least' if part.least else 'at most'} {part.limit:g}"
+    return f"{words[part.verdict]}: {part.name}: {part.value:.3g} (target: {wanted})"
 
 
 UNITS = {"ns": 1e-9, "us": 1e-6, "µs": 1e-6, "ms": 1e-3, "s": 1.0}

@@ -29,7 +29,9 @@ from verification.check import Study
 from verification.claims import peg
 from verification.claims.numbers import claim_tables
 from verification.cost import effects
+from verification.cost.accuracy import numbers_of, recommended
 from verification.finding import Failure, Finding, attempt
+from verification.numbers import value_tables
 from verification.proofs import on_proofs
 from verification.proofs.coq import checked
 
@@ -111,17 +113,26 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
         {name: runs.shipped_scene(name).resolved() for name in SHOWN_SCENES},
         provenance(),
     )
-    needed = stages["effects"].records or {}
-    shown = {name: needed[name] for name in effects.SCENES if name in needed}
+    scene_effects = dict(stages["effects"].records or {})
+    step_times = scene_effects.pop(effects.STEPS, None)
+    measured = stages["accuracy"].records
+    best = recommended(measured) if measured else None
+    seconds = {stage.name: stage.seconds for stage in stages.values()}
+    spent = {"stages": len(seconds), "spent_us": 1e6 * sum(seconds.values())}
+    quoted = {"claims": claim_tables(ledger, lost), "data": value_tables({}, spent)}
+    if step_times and step_times.rows:
+        quoted["effects"] = value_tables({}, effects.numbers_of(step_times))
+    if best:
+        quoted["accuracy"] = value_tables({}, numbers_of(best))
     inputs = {
         **(read or {}),
         **{f"scene/{name}": scene for name, scene in scenes.items()},
         runs.TILTED: tilted,
         "arm_energies": arm_energies(),
-        "work_precision": stages["accuracy"].records,
-        "effect_costs": effects.summary(shown),
-        "effect_steps": effects.steps(needed),
-        "machine": "{cpu}, report of {date}".format_map(facts),
+        "work_precision": measured,
+        "recommended": best,
+        "effect_steps": step_times,
+        "effect_matrix": effects.matrix(scene_effects) if scene_effects else None,
     }
     failed = failed_cases(
         out / "tables", {FIGURE_RUNS: lost} | {one.name: one.failures for one in stages.values()}
@@ -130,13 +141,13 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
         inputs=inputs,
         scenes=scenes,
         claims=ledger,
-        effects=shown,
-        numbers={"claims": claim_tables(ledger, lost)},
+        effects=scene_effects,
+        numbers=quoted,
         topics=tuple(topics),
         failed=failed,
         provenance=facts,
         runs=tuple(runner.used.values()),
-        seconds={stage.name: stage.seconds for stage in stages.values()},
+        seconds=seconds,
     )
 
 

@@ -35,15 +35,6 @@ FIGURE_RUNS: dict[str, tuple[str, dict[str, Any], str, str]] = {
     "device/IAPB-LM": ("peg_corner", EMULATED_DEVICE, "IAPB", "spread"),
     "device/PB": ("peg_corner", EMULATED_DEVICE, "PB", "full"),
     "group/IAPB": ("arm_pushing", {}, "IAPB", "full"),
-    **{
-        f"wall/{world}": (  # 2,000 times stiffer than Colgate's passivity bound: the hard case
-            "wall_1d",
-            {"contact.stiffness": 1.024e6, "contact.damping": 0.0, "duration": 3.0},
-            world,
-            "full",
-        )
-        for world in ("ideal", "IAPB", "PB")
-    },
 }
 
 TILTED = "peg at every tilt"  # name of the input made by `tilted_runs`

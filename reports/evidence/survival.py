@@ -9,7 +9,8 @@ from typing import Any
 from reports.evidence.runs import FIGURE_RUNS, shipped_scene
 from reports.resimulate import repeat_run
 from reports.runner import Runner
-from verification.finding import REFUTED, REPRODUCED, Failure, Finding, Part, finding_of, of_each
+from verification.finding import Failure, Finding, Part, finding_of, of_each
+from verification.numbers import value_tables
 from verification.table import titled
 
 LEAD = "Does a run repeat to the last bit if it is simulated again from its file alone?"
@@ -20,15 +21,7 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
     failures: list[Failure] = []
     repeated = tuple(of_each(FIGURE_RUNS, partial(_repeated, runner), failures))
     same = sum(repetition.same for _, repetition in repeated)
-    part = Part(
-        f"{same} of {len(repeated)} runs of the figures repeat to the last bit when simulated "
-        f"again from "
-        "their own files alone.",
-        REPRODUCED if same == len(repeated) else REFUTED,
-        target="all",
-        asked="Runs of the figures that repeat to the last bit",
-        measured=f"{same} of {len(repeated)}",
-    )
+    part = Part.on("runs that repeat to the last bit", same, len(repeated), least=True)
     table = titled(
         ("run", "content hash stored", "content hash, simulated again", "differs in"),
         [
@@ -36,10 +29,9 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
             for name, one in repeated
         ],
     )
-    tables = {"simulated again": table}
-    return finding_of(
-        "survival", "Runs that repeat", LEAD, part.sentence, (part,), tables, failures
-    )
+    quoted = value_tables({"runs": len(repeated), "same": same})
+    tables = {"simulated again": table, **quoted}
+    return finding_of("survival", "Runs that repeat", LEAD, "", (part,), tables, failures)
 
 
 def _repeated(runner: Runner, name: str) -> Any:

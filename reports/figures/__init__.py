@@ -8,11 +8,9 @@ from reports.figures import (  # noqa: F401
     corner,
     cost,
     energy,
-    film,
     hard_cases,
     paper,
     port,
-    stability,
     tilts,
 )
 from reports.figures.figure import MADE, TEXTS, Recipe

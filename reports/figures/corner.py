@@ -1,14 +1,14 @@
 """The peg in the corner: Figures 7 to 13, in four worlds and with a limited or emulated device.
 
-Each figure shows trajectories or forces of some runs, on the device side. The paper's frame has x
-to the left and y down (its drawing is turned by 180 degrees), so both axes of a path are reversed:
-the corner is at the lower right, as in the paper's Figure 4. Lengths are in metres and angles in
-radians, unless a name says otherwise.
+Each figure shows the path or the force of some runs, on the device side, and judges what the paper
+says of it. The paper's frame has x to the left and y down (its drawing is turned by 180 degrees),
+so both axes of a path are reversed: the corner is at the lower right, as in the paper's Figure 4.
+Lengths are in metres and angles in radians, unless a name says otherwise.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,8 @@ from verification.scenes.measures import Trace
 from verification.table import titled
 
 Floats = NDArray[np.float64]
+Traces = Mapping[str, Trace]
+Measured = Mapping[str, Mapping[str, Any]]
 
 # The runs, by the name that the paper gives their curve, which is also its style; right: the name
 # among the inputs.
@@ -41,156 +43,182 @@ LIMITED = {
 STRATEGIES = {
     "ideal": "corner/ideal",
     "pfull": "corner/IAPB",
-    "psaturated": "corner/IAPB-saturate",
-    "pscaled": "corner/IAPB-scale",
     "pspread": "corner/IAPB-spread",
+    "pscaled": "corner/IAPB-scale",
+    "psaturated": "corner/IAPB-saturate",
 }
 DEVICE = {"IAPB": "device/IAPB", "IAPB LM": "device/IAPB-LM", "PB": "device/PB"}
 
 MILLI, DEGREES = 1e3, 180.0 / np.pi
 _COORDINATES = (("x", "mm", MILLI), ("y", "mm", MILLI), ("θ", "°", DEGREES))
+_FORCES = (("Fx", "N"), ("Fy", "N"), ("torque", "N m"))
 _BEFORE_CONTACT = 0.05  # [s] of the approach that a path shows
-_AT_CONTACT = (
-    -0.01,
-    0.14,
-)  # [s] from the first contact: the impulses of all worlds, separately visible
-_LIMITED = ("fig09", "fig10")  # figures of trajectories with a limited device
-_LAST_PART = (
-    0.2  # of the run: long after the last impact of any world, the mean is the balance of forces
-)
+# [s] from the first contact: the impulses of all worlds, separately visible
+_AT_CONTACT = (-0.01, 0.14)
+# of the run: long after the last impact of any world, the mean is the balance of forces
+_LAST_PART = 0.2
 _MARKS = 9  # markers along a curve: enough to identify it in grey print, few enough to see the line
 # share of the largest distance between curves at which they are seen to part, and to stay at rest
 _APART = 0.05
 _LEAD = 5  # steps before the curves part that are shown
-_NEAR, _SMALL = (
-    11,
-    0.1,
-)  # a pulse has no counterpart if none of this share of it is within so many steps around it
-# Forces that are drawn: coordinate, title, name, unit, and the range between the impulses
-_DRAWN = ((0, "force along x", "Fx", "N", (-0.4, 1.5)), (2, "torque", "τ", "N m", (-0.03, 0.03)))
-# What is measured, and its column in the tables
-_DISTANCES = {"x": "distance from ideal: x [mm]", "y": "y [mm]", "angle": "θ [°]"}
-_MOTION = {
-    "depth": "penetration [mm]",
-    "apart": "largest distance of tool and device [mm]",
-    "impacts": "impacts",
-    "settled": "settled at [s]",
-}
-_FORCES = {
-    "Fx": "peak |Fx| [N]",
-    "Fy": "peak |Fy| [N]",
-    "torque": "peak |τ| [N m]",
-    "held Fx": "held Fx [N]",
-    "held Fy": "held Fy [N]",
-    "held torque": "held τ [N m]",
-}
-_FROM_IDEAL = (
-    "Distances from the ideal path of the hand are root mean squares from the first contact until "
-    "all "
-    "worlds of the figure settle or the run ends. "
-)
-_SETTLED = (
-    "Settled: from then on slower than 1 mm/s and 10 mrad/s; a dash means not within the run."
-)
-_HELD = (
-    "Held: mean over the last fifth of the run. The hand pushes with Fx = −0.32 N, Fy = 0.4 N, so "
-    "a world in "
-    "balance holds 0.32 and −0.4 N."
-)
+# a pulse has no counterpart if none of this share of it is within so many steps around it
+_NEAR, _SMALL = 11, 0.1
+_LARGE = 10.0  # times the force that is held: a pulse
+_BALANCED = 0.01  # share of the hand's force
 _DIGITS = 9  # of millimetres: a picometre and less is rounding of the coordinates, not motion
 
-Traces = Mapping[str, Trace]
+_DISTANCES = {"x": "x from ideal [mm]", "y": "y from ideal [mm]", "angle": "θ from ideal [°]"}
+_DEVICE = {"settled": "at rest after [s]", "bounces": "bounces", "depth": "sinks in [mm]"}
+_PEAKS = {"Fx": "largest |Fx| [N]", "Fy": "largest |Fy| [N]", "torque": "largest |τ| [N m]"}
+_REST = {"depth": "sinks in [mm]", "apart": "tool and device apart [mm]", "impacts": "impacts"}
 
 
-def _recipe(number: int, runs: Mapping[str, str], forces: bool) -> Recipe:
-    """Return the recipe of a figure of the paper with trajectories or forces of some runs."""
+def _figure(
+    number: int,
+    runs: Mapping[str, str],
+    forces: bool,
+    shown: Mapping[str, str],
+    same: Callable[[Measured], Mapping[str, bool]],
+) -> Recipe:
+    """Return the recipe of a figure of the paper with the paths or forces of some runs."""
     key = f"fig{number:02d}"
+    # one window for all figures of the corner, so that a run has the same distances in each
+    every = {**runs, **UNLIMITED, **STRATEGIES} if "ideal" in runs else dict(runs)
 
     def draw(*given: Run) -> Drawn:
-        named = dict(zip(runs, given, strict=True))
+        named = dict(zip(every, given, strict=True))
         traces = {curve: measures.trace_of(run) for curve, run in named.items()}
         window = measures.comparison_window([*traces.values()])
+        traces = {curve: traces[curve] for curve in runs}
         measured = {
-            curve: _measured(trace, traces.get("ideal"), window) for curve, trace in traces.items()
+            curve: measured_of(named[curve], trace, traces.get("ideal"), window)
+            for curve, trace in traces.items()
         }
-        told: dict[str, Any] = {
-            **measured,
-            "tilt": DEGREES * next(iter(traces.values())).device[0, 2],
-            "damping": (given[0].scene_resolved["device"]["damping"] or [0.0])[0],
-        }
-        panels, shown, note = (
-            (_forces(key, traces), _FORCES, _HELD)
+        panels = (
+            _forces(key, traces)
             if forces
-            else (_trajectories(key, named, traces), _MOTION, _SETTLED)
+            else [*_path(key, {curve: named[curve] for curve in runs}), *_motions(key, traces)]
         )
-        if forces and "ideal" in runs:
-            told["lone"] = _lone_pulse(
-                *next((named[curve], traces[curve]) for curve in named if "IAPB" in curve),
-                traces["ideal"],
-            )
-        elif "ideal" in runs:
-            shown, note = _DISTANCES | shown, _FROM_IDEAL + note
-            told |= {
-                name: ", ".join(
-                    sorted(measured.keys() - {"ideal"}, key=lambda curve: measured[curve][name])
-                )
-                for name in ("distance", "angle")
-            }
-        rows = tuple((curve, *(each[name] for name in shown)) for curve, each in measured.items())
+        columns = {**shown, **(_REST if shown is _DISTANCES else {})}
+        rows = [(curve, *(each[name] for name in columns)) for curve, each in measured.items()]
         return Drawn(
             panels,
-            titled(("world", *shown.values()), rows, digits=3, note=note),
+            titled(("world", *columns.values()), rows, digits=3),
             {curve: STYLES[curve] for curve in runs},
-            told,
+            measured,
+            same(measured),
+            tuple(shown.values()),
         )
 
-    return recipe(key, *runs.values())(draw)
+    return recipe(key, *every.values())(draw)
 
 
-def _measured(trace: Trace, ideal: Trace | None, window: slice) -> dict[str, Any]:
-    """Return the numbers of one curve, by the names that tables and texts use: [mm], [°], [s], [N]
-    and [N m]."""
-    force, state, peaks = trace.device_force, measures.settled_at(trace), measures.peak_force(trace)
+def measured_of(run: Run, trace: Trace, ideal: Trace | None, window: slice) -> dict[str, Any]:
+    """Return the numbers of one curve by name: [mm], [°], [s], [N] and [N m]."""
+    force, state = trace.device_force, measures.settled_at(trace)
     held = force[-max(int(_LAST_PART * len(force)), 1) :].mean(axis=0)
-    settled = float(trace.time[state]) if state < len(trace.time) else None
-    pulse = [f"{each:.1f}" for each in np.abs(force[:, 0]) if each > _SMALL * peaks[0]]
-    found = {
+    hand = trace.hand_force[-1]
+    found: dict[str, Any] = {
         "depth": round(MILLI * measures.deepest_penetration(trace), _DIGITS),
         "apart": round(MILLI * float(np.hypot(*measures.largest_separation(trace)[:2])), _DIGITS),
         "impacts": len(trace.impact_step),
         "bounces": measures.bounces(trace),
-        "settled": settled,
-        "rests": "never in the run" if settled is None else f"at {settled:.2f} s",
-        "steps": len(pulse),
-        "pulse": " and ".join(pulse),
-        **dict(zip(_FORCES, (*peaks.tolist(), *held.tolist()), strict=True)),
+        "settled": float(trace.time[state]) if state < len(trace.time) else None,
+        "rests": f"{trace.time[state]:.2f}" if state < len(trace.time) else "not in this run",
+        "held": float(np.abs(held[:2]).max()),
+        "balanced": bool(np.hypot(*(held + hand)[:2]) <= _BALANCED * np.hypot(*hand[:2])),
     }
+    peaks = measures.peak_force(trace).tolist()
+    found |= {name: peak for (name, _), peak in zip(_FORCES, peaks, strict=True)}
     if ideal is not None:
         x, y, angle = measures.root_mean_square(trace, ideal, window).tolist()
-        past = np.abs(trace.device[-1] - ideal.device[-1])
         found |= {
             "x": MILLI * x,
             "y": MILLI * y,
             "angle": DEGREES * angle,
-            "distance": MILLI * np.hypot(x, y),
-            "past x": MILLI * past[0],
-            "past y": MILLI * past[1],
+            "distance": MILLI * float(np.hypot(x, y)),
+            "lone torque": lone_torque(trace, ideal),
         }
+        found["pull"] = -float(run.contacts.impulse.min(initial=0.0))
     return found
 
 
-def _lone_pulse(run: Run, trace: Trace, ideal: Trace) -> dict[str, float]:
-    """Return the largest torque of a run [N m] in a step around which ideal has none, its time, and
-    its strongest pull.
-
-    A pull is an impulse [N s] against the normal of its contact.
-    """
+def lone_torque(trace: Trace, ideal: Trace) -> float:
+    """Return the largest torque of a run [N m] in a step around which ideal has none."""
     from scipy.ndimage import maximum_filter1d
 
     ours, theirs = (np.abs(each.device_force[:, 2]) for each in (trace, ideal))
-    step = int(np.argmax(np.where(maximum_filter1d(theirs, _NEAR) < _SMALL * ours, ours, 0.0)))
-    impulses = run.contacts.impulse[slice(*run.contacts.offsets[step : step + 2])]
-    return {"torque": ours[step], "time": run.time[step], "pull": -impulses.min(initial=0.0)}
+    alone = maximum_filter1d(theirs, _NEAR) < _SMALL * ours
+    return float(np.where(alone, ours, 0.0).max())
+
+
+# What the paper says of each figure, and whether our numbers say the same
+
+
+def _nearer(m: Measured, curve: str) -> dict[str, bool]:
+    return {
+        f"nearer than {other}": m[curve]["distance"] < m[other]["distance"]
+        for other in ("PB", "CBuc")
+    }
+
+
+def _same_7(m: Measured) -> dict[str, bool]:
+    return _nearer(m, "IAPB")
+
+
+def _same_8(m: Measured) -> dict[str, bool]:
+    ours, ideal = m["IAPB"], m["ideal"]
+    return {
+        "large at a new contact": all(each["Fx"] > _LARGE * each["held"] for each in (ours, ideal)),
+        "then balances the hand": ours["balanced"],
+        "nearest to ideal": all(
+            abs(ours[name] - ideal[name]) < abs(m[other][name] - ideal[name])
+            for name, _ in _FORCES
+            for other in ("PB", "CBuc")
+        ),
+        "no torque that ideal lacks": ours["lone torque"] <= _SMALL * ours["torque"],
+    }
+
+
+def _same_9(m: Measured) -> dict[str, bool]:
+    lost = {name: m[name]["distance"] for name in ("pspread", "pscaled", "psaturated")}
+    return {
+        "clipping loses most": max(lost, key=lost.__getitem__) == "psaturated",
+        "spreading loses least": min(lost, key=lost.__getitem__) == "pspread",
+    }
+
+
+def _same_10(m: Measured) -> dict[str, bool]:
+    return _nearer(m, "IAPB LM") | {"sinks in less": m["IAPB LM"]["depth"] < m["PB"]["depth"]}
+
+
+def _harder(m: Measured, *curves: str) -> dict[str, bool]:
+    return {
+        f"{curve} harder than PB": all(m[curve][name] > m["PB"][name] for name, _ in _FORCES)
+        for curve in curves
+    }
+
+
+def _same_11(m: Measured) -> dict[str, bool]:
+    return _harder(m, "IAPB LM")
+
+
+def _same_12(m: Measured) -> dict[str, bool]:
+    impulses, springs = ("IAPB", "IAPB LM"), m["PB"]
+    rest = {
+        curve: np.inf if each["settled"] is None else each["settled"] for curve, each in m.items()
+    }
+    return {
+        "sooner at rest": all(rest[curve] < rest["PB"] for curve in impulses),
+        "fewer bounces": all(m[curve]["bounces"] < springs["bounces"] for curve in impulses),
+    }
+
+
+def _same_13(m: Measured) -> dict[str, bool]:
+    return _harder(m, "IAPB", "IAPB LM")
+
+
+# The drawings
 
 
 def _marks(count: int, number: int) -> tuple[int, int]:
@@ -208,99 +236,69 @@ def _first_shown(runs: Mapping[str, Run]) -> int:
         for run in runs.values()
         if len(run.contacts.gap)
     ]
-    return (
-        max(min(touching) - round(_BEFORE_CONTACT / next(iter(runs.values())).dt), 0)
-        if touching
-        else 0
-    )
+    lead = round(_BEFORE_CONTACT / next(iter(runs.values())).dt)
+    return max(min(touching) - lead, 0) if touching else 0
 
 
-def _trajectories(key: str, runs: Mapping[str, Run], traces: Traces) -> list[Panel]:
-    """Draw the path and, from where the curves differ, the three coordinates and the distances from
-    ideal.
+def _path(key: str, runs: Mapping[str, Run]) -> list[Panel]:
+    """Draw y against x of the device, from shortly before the first contact."""
+    first = _first_shown(runs)
+    with Plot(f"{key}-path", kind=PATH) as plot:
+        for number, (curve, run) in enumerate(runs.items()):
+            x, y = MILLI * run.device_q[first:, :2].T
+            marks = _marks(len(x), number)
+            look = line_arguments(STYLES[curve])
+            plot.axes.plot(x, y, **look, markevery=marks, zorder=3 + number / 10)
+        plot.axes.set(xlabel="x [mm]", ylabel="y [mm]")
+        plot.axes.xaxis.set_inverted(True)
+        plot.axes.yaxis.set_inverted(True)
+        note(plot.axes, (x[0], y[0]), "start", (0, 8), fontsize=8, color=MUTED)
+    told = f"Paths of the hand in the plane, in mm: {', '.join(runs)}."
+    return [Panel(plot.svg, told, "path of the hand, from just before contact")]
 
-    If a device is limited, also draw how far tool and device come apart, and the penetration.
-    """
 
-    def over(suffix: str, values: Mapping[str, Floats], axis: str, label: str) -> Panel:
-        return _over_time(
-            f"{key}-{suffix}", traces, values, axis, label, *_seen_apart([*values.values()])
-        )
-
-    ends = "; ".join(
-        "{} ends at ({:.1f}, {:.1f})".format(curve, *(MILLI * trace.device[-1, :2]))
-        for curve, trace in traces.items()
-    )
-    panels = [
-        Panel(
-            _path(f"{key}-path", runs),
-            f"Paths of the hand in the plane, in mm: {ends}.",
-            "path of the hand, from just before contact",
-        )
-    ]
+def _motions(key: str, traces: Traces) -> list[Panel]:
+    """Draw the three coordinates from where the curves differ."""
+    panels = []
     for k, (name, unit, factor) in enumerate(_COORDINATES):
         values = {curve: factor * trace.device[:, k] for curve, trace in traces.items()}
-        panels.append(over("xyz"[k], values, f"{name} [{unit}]", f"{name}, from where they differ"))
-    if "ideal" in traces:
-        off = {
-            curve: trace.device - traces["ideal"].device
-            for curve, trace in traces.items()
-            if curve != "ideal"
-        }
-        panels += [
-            over(
-                "off-position",
-                {curve: MILLI * np.hypot(*path[:, :2].T) for curve, path in off.items()},
-                "distance from ideal [mm]",
-                "distance from ideal, position",
-            ),
-            over(
-                "off-angle",
-                {curve: DEGREES * np.abs(path[:, 2]) for curve, path in off.items()},
-                "angle from ideal [°]",
-                "distance from ideal, angle",
-            ),
-        ]
-    if key in _LIMITED:
-        apart = {
-            curve: MILLI * np.hypot(*(trace.tool - trace.device)[:, :2].T)
-            for curve, trace in traces.items()
-        }
-        depths = {curve: MILLI * trace.penetration for curve, trace in traces.items()}
-        panels += [
-            over("apart", apart, "distance [mm]", "how far tool and device come apart"),
-            over("depth", depths, "penetration [mm]", "how deep the virtual peg sinks in"),
-        ]
+        shown = _seen_apart([*values.values()])
+        label = f"{name}, from where they differ"
+        panels.append(_over_time(f"{key}-{k}", traces, values, f"{name} [{unit}]", label, shown))
     return panels
 
 
-def _seen_apart(values: Sequence[Floats]) -> tuple[int, int]:
-    """Return the steps just before the curves part, and when all are at rest."""
+def _seen_apart(values: Sequence[Floats]) -> slice:
+    """Return the steps from just before the curves part until all are at rest."""
     every = np.array(values)
     spread = np.ptp(every, axis=0)
     seen = _APART * spread.max()
     parted = int(np.argmax(spread > seen))
     rest = np.flatnonzero((np.abs(every - every[:, -1:]) > seen).any(axis=0)).max(initial=parted)
-    return max(parted - _LEAD, 0), int(rest) + int(rest - parted) // 10 + 2
+    return slice(max(parted - _LEAD, 0), int(rest) + int(rest - parted) // 10 + 2)
 
 
-def _path(key: str, runs: Mapping[str, Run]) -> str:
-    """Draw y against x of the device, from shortly before the first contact."""
-    with Plot(key, kind=PATH) as plot:
-        for number, (curve, run) in enumerate(runs.items()):
-            x, y = MILLI * run.device_q[_first_shown(runs) :, :2].T
-            plot.axes.plot(
-                x,
-                y,
-                **line_arguments(STYLES[curve]),
-                markevery=_marks(len(x), number),
-                zorder=3 + number / 10,
+def _forces(key: str, traces: Traces) -> list[Panel]:
+    """Draw the forces along x and y at the first contact."""
+    window, dt = measures.comparison_window([*traces.values()]), next(iter(traces.values())).dt
+    first, last = (window.start + round(seconds / dt) for seconds in _AT_CONTACT)
+    panels = []
+    for k, (name, unit) in enumerate(_FORCES[:2]):
+        values = {curve: trace.device_force[:, k] for curve, trace in traces.items()}
+        label = f"{name}, {np.ptp(_AT_CONTACT):.2g} s around the first contact"
+        shown = slice(max(first, 0), last)
+        panels.append(
+            _over_time(
+                f"{key}-{k}",
+                traces,
+                values,
+                f"{name} [{unit}]",
+                label,
+                shown,
+                drawstyle="steps-post",
             )
-        plot.axes.set(xlabel="x [mm]", ylabel="y [mm]")
-        plot.axes.xaxis.set_inverted(True)
-        plot.axes.yaxis.set_inverted(True)
-        note(plot.axes, (x[0], y[0]), "start", (0, 8), fontsize=8, color=MUTED)
-    return plot.svg
+        )
+    return panels
 
 
 def _over_time(
@@ -309,72 +307,25 @@ def _over_time(
     values: Mapping[str, Floats],
     axis: str,
     label: str,
-    first: int,
-    last: int,
-    height: tuple[float, float] | None = None,
+    shown: slice,
     **how: Any,
 ) -> Panel:
-    """Draw a quantity of each run over time, from step `first` to step `last`; `height` limits the
-    vertical axis."""
-    time = next(iter(traces.values())).time[first:last]
+    """Draw a quantity of each run over the time of some steps."""
+    time = next(iter(traces.values())).time[shown]
     with Plot(key, kind=TIME) as plot:
         for number, (curve, whole) in enumerate(values.items()):
-            shown = whole[first:last]
-            plot.axes.plot(
-                time[: len(shown)],
-                shown,
-                **line_arguments(STYLES[curve]),
-                **how,
-                markevery=_marks(len(shown), number),
-                zorder=3 + number / 10,
-            )
-        plot.axes.set(xlabel="t [s]", ylabel=axis, xlim=time[[0, -1]], ylim=height)
-    ranges = ", ".join(
-        f"{curve} {min(each):.3g} to {max(each):.3g}" for curve, each in values.items()
-    )
-    return Panel(plot.svg, f"{axis} over time, in the whole run: {ranges}.", label)
+            part = whole[shown]
+            look = line_arguments(STYLES[curve]) | how
+            marks = _marks(len(part), number)
+            plot.axes.plot(time[: len(part)], part, **look, markevery=marks, zorder=3 + number / 10)
+        plot.axes.set(xlabel="t [s]", ylabel=axis, xlim=time[[0, -1]])
+    return Panel(plot.svg, f"{axis} over time: {', '.join(values)}.", label)
 
 
-def _forces(key: str, traces: Traces) -> list[Panel]:
-    """Draw force along x and torque at the first contact, and magnified around the holding force.
-
-    The force of an impact in one step is hundreds of times the holding force afterwards.
-    """
-    window, panels = measures.comparison_window([*traces.values()]), list[Panel]()
-    start, *ends = (
-        window.start + round(seconds / next(iter(traces.values())).dt) for seconds in _AT_CONTACT
-    )
-    for k, title, name, unit, cut in _DRAWN:
-        values = {curve: trace.device_force[:, k] for curve, trace in traces.items()}
-        for suffix, view, last, height in (
-            ("c", f"{np.ptp(_AT_CONTACT):.2g} s around first contact", ends[0], None),
-            ("m", "until all worlds rest, pulses cut off", window.stop, cut),
-        ):
-            panels.append(
-                _over_time(
-                    f"{key}-{k}{suffix}",
-                    traces,
-                    values,
-                    f"{name} [{unit}]",
-                    f"{title}, {view}",
-                    max(start, 0),
-                    last,
-                    height,
-                    drawstyle="steps-post",
-                )
-            )
-    return panels
-
-
-RECIPES = tuple(
-    _recipe(number, runs, forces)
-    for number, runs, forces in (
-        (7, UNLIMITED, False),
-        (8, UNLIMITED, True),
-        (9, STRATEGIES, False),
-        (10, LIMITED, False),
-        (11, LIMITED, True),
-        (12, DEVICE, False),
-        (13, DEVICE, True),
-    )
-)
+_figure(7, UNLIMITED, False, _DISTANCES, _same_7)
+_figure(8, UNLIMITED, True, _PEAKS, _same_8)
+_figure(9, STRATEGIES, False, _DISTANCES, _same_9)
+_figure(10, LIMITED, False, _DISTANCES, _same_10)
+_figure(11, LIMITED, True, _PEAKS, _same_11)
+_figure(12, DEVICE, False, _DEVICE, _same_12)
+_figure(13, DEVICE, True, _PEAKS, _same_13)

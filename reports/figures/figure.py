@@ -18,7 +18,7 @@ from markupsafe import Markup, escape
 
 from reports.figures.style import INK, MUTED, PAPER, LineStyle, css
 from verification.finding import Failure, attempt
-from verification.table import Table
+from verification.table import Table, titled
 
 Legend = Mapping[str, LineStyle] | Iterable[tuple[str, LineStyle]]
 
@@ -31,7 +31,6 @@ class Panel:
     alt: str
     label: str = ""
     wide: bool = False  # take the whole width of the page
-    film: bool = False  # played by the browser (reports/figures/film.py)
 
     @property
     def is_table(self) -> bool:
@@ -69,12 +68,19 @@ def grid(columns: Sequence[str], rows: Mapping[str, Sequence[Markup]], kind: str
 
 @dataclass(frozen=True)
 class Drawn:
-    """The result of a recipe's function; `told` are the values that the caption names."""
+    """The result of a recipe's function.
+
+    told : the values that the texts name
+    same : whether our numbers say each statement of the paper, by its name
+    dots : titles of the columns of `numbers` that the page draws as dots
+    """
 
     panels: Sequence[Panel]
     numbers: Table | None = None
     legend: Legend = ()
     told: Mapping[str, Any] = field(default_factory=dict)
+    same: Mapping[str, bool] = field(default_factory=dict)
+    dots: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -86,8 +92,10 @@ class Figure:
     ----------
     inputs : names of the runs and tables it was drawn from; missing : those that it lacks, so that
         it has no panels
-    said : what the paper says, what we find, what is the same, what differs; claims : the claims
-        that it shows
+    said : what the paper says, and what we find; same : whether our numbers say the same, by
+        statement
+    claims : the claims that it shows
+    dots : columns of `numbers` that are drawn as dots
     section : the section of the report that has it
     """
 
@@ -101,8 +109,29 @@ class Figure:
     inputs: tuple[str, ...] = ()
     missing: tuple[str, ...] = ()
     said: tuple[str, ...] = ()
+    same: Mapping[str, bool] = field(default_factory=dict)
+    dots: tuple[str, ...] = ()
     claims: tuple[str, ...] = ()
     section: str = "figures"
+
+
+def statements(figures: Iterable[Figure]) -> Table:
+    """Return a row for each statement of the paper on a figure, and whether our numbers say the
+    same."""
+    rows = [(one.number, name, held) for one in figures for name, held in one.same.items()]
+    return titled(("figure", "statement", "same"), rows)
+
+
+def numbers_of(figures: Iterable[Figure]) -> dict[str, Any]:
+    """Return how many figures say the same as the paper's, and which do so only in part or not at
+    all."""
+    judged = [figure for figure in figures if figure.same]
+    differ = [one for one in judged if not all(one.same.values())]
+    return {
+        "figures": len(judged),
+        "figures_same": len(judged) - len(differ),
+        "figures_that_differ": " and ".join(one.number.removeprefix("Figure ") for one in differ),
+    }
 
 
 @dataclass(frozen=True)
@@ -166,6 +195,8 @@ def draw(
             legend=tuple(dict(made.legend).items()),
             inputs=recipe.needs,
             said=tuple(said),
+            same=made.same,
+            dots=made.dots,
             claims=text.get("claims", ()),
         )
 

@@ -27,7 +27,6 @@ from reports.figures.style import (
     INK,
     LINK,
     MUTED,
-    PANEL,
     PAPER,
     PEG,
     STYLES,
@@ -46,6 +45,69 @@ _BOARD = (
     np.zeros(2),
     np.array([8.2, 5.2]),
 )  # corners of the diagrams of Figure 5, in arbitrary units
+
+
+_RESTITUTION = 0.5  # of the picture of one impact
+_VELOCITY = np.array([-1.5, 1.1])  # in the kinetic metric; the contact is the vertical line
+
+
+@recipe("impact-and-step")
+def impact_and_step() -> Drawn:
+    """Draw the velocity before and after one impact, and the loop of a step."""
+    along = np.array([_VELOCITY[0], 0.0])
+    after = _VELOCITY - (1.0 + _RESTITUTION) * along
+    size = (4.3, 3.3)
+    with Canvas("idea-impact", np.array([-2.0, -0.5]), np.array([1.9, 2.5]), size) as impact:
+        axes = impact.axes
+        turn = np.linspace(0.0, np.pi, 90)
+        axes.plot(
+            *np.hypot(*_VELOCITY) * np.array([np.cos(turn), np.sin(turn)]),
+            color=MUTED,
+            dashes=(3, 3),
+        )
+        axes.plot([0.0, 0.0], [-0.35, 2.3], color=MUTED, linewidth=0.8)
+        note(axes, (0.0, 2.3), "velocities that keep the contact", (0, 7), color=MUTED, fontsize=8)
+        note(axes, (1.05, 1.54), "equal energy", (22, 8), color=MUTED, fontsize=8)
+        for vector, name, color, offset in (
+            (_VELOCITY, "v⁻", INK, (-2, 10)),
+            (along, "P v⁻", VERMILION, (0, -9)),
+            (after, "v⁻ − (1 + e) P v⁻", BLUE, (-10, 11)),
+        ):
+            arrow(axes, (0.0, 0.0), vector, color=color)
+            note(axes, vector, name, offset, color=color)
+        axes.plot(*np.array([_VELOCITY, after]).T, color=BLUE, linewidth=1.0, linestyle=(0, (2, 2)))
+    with Canvas("idea-step", np.zeros(2), np.array([8.6, 6.6]), size) as step:
+        axes = step.axes
+        wide = (4.4, 1.0)
+        _block(axes, (4.3, 5.9), "find contacts", wide, facecolor="none")
+        _block(axes, (2.05, 3.9), "new and approaching:\none impulse, v⁻ to v⁺", (3.9, 1.3))
+        _block(axes, (6.55, 3.9), "lasting:\nspring and damper", (3.5, 1.3), facecolor="none")
+        _block(axes, (4.3, 1.9), "add the hand's force", wide, facecolor="none")
+        _block(axes, (4.3, 0.6), "move by one step, 1/512 s", wide, facecolor="none")
+        for corners in (
+            [(3.2, 5.4), (2.05, 4.55)],
+            [(5.4, 5.4), (6.55, 4.55)],
+            [(2.05, 3.25), (3.2, 2.4)],
+            [(6.55, 3.25), (5.4, 2.4)],
+            [(4.3, 1.4), (4.3, 1.1)],
+            [(6.5, 0.6), (8.5, 0.6), (8.5, 5.9), (6.5, 5.9)],
+        ):
+            _wire(axes, corners)
+    panels = (
+        Panel(
+            impact.svg,
+            "An arrow v⁻, its part P v⁻ along the contact, and the velocity after the impact, which "
+            "is no longer than v⁻.",
+            f"one impact, e = {_RESTITUTION:g}",
+        ),
+        Panel(
+            step.svg,
+            "Find contacts; new ones get an impulse, lasting ones a spring; add the hand's force; "
+            "move; again.",
+            "one step",
+        ),
+    )
+    return Drawn(panels)
 
 
 @recipe("fig01", "group/IAPB")
@@ -119,6 +181,7 @@ CONTACTS = {"A": 0.7, "B": 0.5}  # distance along the second link [m]
 VELOCITY = np.array([1.0, 1.0])  # [rad/s]
 # M of the straight arm [kg m²], its links of 1 m and 1 kg: slender uniform rods, or all mass at the
 # far ends
+_ROUNDING = 1e-12
 READINGS = {
     "uniform rods": np.array([[8 / 3, 5 / 6], [5 / 6, 1 / 3]]),
     "point masses": np.array([[5.0, 2.0], [2.0, 1.0]]),
@@ -234,10 +297,17 @@ def energy_loss(energies: Mapping[str, Floats]) -> Drawn:
     rows = tuple((float(e[k]), *(float(energies[name][k]) for name in series)) for k in shown)
     told = "KE₀ is 7/3 J for uniform rods and 5 J for point masses at the far ends of the links."
     numbers = titled(("e", *(f"{name} [J]" for name in series)), rows, digits=6, note=told)
+    rods = {name: energies[f"uniform rods, {name}"][0] for name in CONTACTS}
+    whole = float(energies["uniform rods, KE0"][0])
     return Drawn(
         panels,
         numbers,
         {name: STYLES[name] for name in READINGS} | {"before the collision, KE₀": BOUND},
+        {**rods, "before": whole},
+        {
+            "takes all at B": bool(rods["B"] < _ROUNDING * whole),
+            "takes a part at A": bool(0.0 < rods["A"] < whole),
+        },
     )
 
 
@@ -465,25 +535,3 @@ def _wire(
         },
     )
     axes.text(*at, text, ha=align, va="center", fontsize=8.5, color=color, zorder=4)
-
-
-@recipe("scenes", "scene/peg_hole", "scene/wall_1d")
-def gallery(*scenes: Mapping[str, Any]) -> Drawn:
-    """Draw every scene at its start: walls, bodies and the hand's force."""
-    panels = []
-    for scene in scenes:
-        low, high = bounds(body_outlines(scene), 0.25)
-        reach = max(high - low)
-        with Canvas(
-            f"scenes-{scene['name']}",
-            low - 0.35 * reach,
-            high + 0.35 * reach,
-            PANEL,
-            turned=is_turned(scene),
-        ) as canvas:
-            canvas.walls(scene, 20 * reach)
-            canvas.bodies(scene)
-            canvas.hand(scene, None, 0.28 * reach)
-        words = f"{scene['title']}: {len(scene['bodies'])} moving bodies, {len(scene['walls'])} walls, at the start."
-        panels.append(Panel(canvas.svg, words, scene["title"]))
-    return Drawn(panels)

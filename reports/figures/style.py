@@ -14,13 +14,14 @@ from typing import Any
 
 INK, MUTED, RULE, PAPER = "#1b1f24", "#66707b", "#d9dde2", "#fffefc"
 WALL, PEG, FORCE, LINK = "#c9cdd2", "#dbe7f1", "#b3261e", "#8fa3b5"
-BLUE, VERMILION, GREEN, PURPLE, AMBER, SKY = (
+BLUE, VERMILION, GREEN, PURPLE, AMBER, SKY, NAVY = (
     "#0072b2",
     "#d55e00",
     "#00896a",
     "#a5508a",
     "#b07d00",
     "#3a97cf",
+    "#0b3f7d",
 )
 
 # hex value -> name of the page's variable; the hex value itself stays the fallback outside of the
@@ -40,6 +41,7 @@ VARIABLES = {
     PURPLE: "purple",
     AMBER: "amber",
     SKY: "sky",
+    NAVY: "navy",
 }
 
 
@@ -67,27 +69,25 @@ class LineStyle:
 LOOKS: tuple[tuple[tuple[str, ...], LineStyle], ...] = (
     # the worlds of the paper and of this project
     (("ideal",), LineStyle(INK, "", (), 2.4)),
-    (("IAPB", "pfull", "factored", "impulses"), LineStyle(BLUE, "o", (), 1.6)),
-    (("PB", "penalty"), LineStyle(VERMILION, "s", (5, 1.6), 1.5)),
-    (("CBuc",), LineStyle(GREEN, "^", (1.4, 1.4), 1.6)),
+    (("IAPB", "pfull", "factored"), LineStyle(BLUE, "o", (), 1.6)),
+    (("PB", "stiff springs only"), LineStyle(VERMILION, "s", (5, 1.6), 1.5)),
+    (("CBuc",), LineStyle(PURPLE, "^", (1.4, 1.4), 1.6)),
     (("ideal-friction",), LineStyle(INK, "D", (4, 1.6), 1.6)),
     (("IAPB-friction",), LineStyle(SKY, "v", (6, 1.6, 1.4, 1.6), 1.5)),
     (("IAPB-push",), LineStyle(AMBER, "P", (3, 1.2), 1.5)),
     # IAPB with a limited device
-    (("psaturated",), LineStyle(AMBER, "X", (5, 1.6), 1.5)),
+    (("psaturated",), LineStyle(LINK, "X", (5, 1.6), 1.5)),
     (("pscaled",), LineStyle(SKY, "D", (1.4, 1.4), 1.6)),
-    (("pspread", "IAPB LM"), LineStyle(PURPLE, "D", (6, 1.6, 1.4, 1.6), 1.6)),
-    # methods for an impact and solvers; what Python calls is dashed, its marks empty
-    (("IAPB, Python",), LineStyle(BLUE, "o", (4, 2), 1.2, filled=False)),
+    (("pspread", "IAPB LM"), LineStyle(NAVY, "D", (6, 1.6, 1.4, 1.6), 1.6)),
+    # walls as stiff as the step allows
+    (("IAPB, stiff springs",), LineStyle(SKY, "P", (3, 1.2), 1.4)),
+    # methods for an impact
     (("factored, no clamp",), LineStyle(SKY, "s", (5, 1.6))),
     (("printed, numpy", "gram_pinv", "gram_pinv, as printed"), LineStyle(PURPLE, "s", (4, 2), 1.4)),
-    (("Gauss-Seidel",), LineStyle(VERMILION, "v", (), 1.4)),
-    (("Lemke",), LineStyle(GREEN, "<", (), 1.4)),
-    (("DAQP, Python",), LineStyle(AMBER, "D", (4, 2), 1.2, filled=False)),
-    # other engines
-    (("MuJoCo",), LineStyle(PURPLE, "^", (6, 1.6, 1.4, 1.6))),
+    # other people's engines, called from Python
+    (("MuJoCo", "MuJoCo, from Python"), LineStyle(AMBER, "D", (6, 1.6, 1.4, 1.6), filled=False)),
     # worlds called from Python
-    (("ideal, Python",), LineStyle(INK, "o", (), 1.6, filled=False)),
+    (("rigid wall, from Python",), LineStyle(INK, "o", (), 1.6, filled=False)),
     # rows of an impact
     (("relative rows (12)",), LineStyle(BLUE, "D")),
     (("per-body rows (13)-(14)",), LineStyle(VERMILION, "X", (5, 1.6))),
@@ -113,7 +113,7 @@ OUTCOMES: dict[str, LineStyle] = {
 CYCLE = (
     LineStyle(SKY, "o"),
     LineStyle(AMBER, "s", (5, 1.6)),
-    LineStyle(PURPLE, "^", (1.4, 1.4)),
+    LineStyle(GREEN, "^", (1.4, 1.4)),
     LineStyle(MUTED, "D", (6, 1.6, 1.4, 1.6)),
     LineStyle(BLUE, "v"),
     LineStyle(VERMILION, "P", (3, 1.2)),

@@ -17,6 +17,7 @@ from markupsafe import Markup
 from reports.figures import RECIPES
 from reports.figures.condition_map import condition_map
 from reports.figures.figure import TEXTS, Figure, Recipe, draw, swatch
+from reports.figures.figure import numbers_of as figure_numbers
 from reports.figures.numbers import format_cell, is_number
 from reports.pages.first import count_claims
 from reports.pages.formulas import formula, prose
@@ -39,6 +40,7 @@ ROWS_SHOWN = 200
 QUOTED = (
     "energy",
     "claims",
+    "data",
     "figures",
     "energy",
     "proofs",
@@ -134,7 +136,7 @@ def build_report(
         "policy": policy,
         "evidence": evidence,
         "topics": {topic.key: topic for topic in evidence.topics},
-        "numbers": numbers_of(evidence, QUOTED),
+        "numbers": numbers_of(evidence, QUOTED) | {"figures": figure_numbers(given)},
         "figures": bare | {figure.key: figure for figure in given},
         "run_counts": Counter(user for run in evidence.runs for user in run.used_by),
         "maps": {claim.key: map_of(claim) for claim in evidence.claims},

@@ -6,6 +6,7 @@ error; a topic that was not computed prints "not computed in this run".
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -103,4 +104,22 @@ def time(microseconds: float, digits: int = 3) -> str:
     return f"{format_number(microseconds / 1e6, digits)}{NARROW}s"
 
 
-FILTERS = {"num": num, "percent": percent, "times": times, "time": time}
+def place(value: float, most: float) -> str:
+    """Return the place of a value on an axis from 0 to `most`, in percent of its length."""
+    return f"{100.0 * min(max(value / most, 0.0), 1.0):.1f}%"
+
+
+def log_place(value: float, least: float, most: float) -> str:
+    """Return the place of a value on a logarithmic axis, in percent of its length."""
+    share = math.log(max(value, least) / least) / math.log(most / least)
+    return f"{100.0 * min(share, 1.0):.1f}%"
+
+
+FILTERS = {
+    "num": num,
+    "percent": percent,
+    "times": times,
+    "time": time,
+    "place": place,
+    "log_place": log_place,
+}

@@ -561,7 +561,7 @@ def test_bench_names_a_method_for_a_budget_and_prints_its_tables(iapb, answer, m
     for name, stand_in in (
         ("which_method", lambda *given: asked.append(given) or (choice,)),
         ("haptic_study", lambda *_: with_failures(finding, [FAILED])),
-        ("choices", lambda _: Table(())),
+        ("recommended", lambda _: Table(())),
         ("work_precision", lambda **_: Table((Column("y"),), ((2,),))),
     ):
         monkeypatch.setattr(f"reports.commands.bench.{name}", stand_in)

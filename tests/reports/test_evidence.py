@@ -305,17 +305,16 @@ def of_effects(patch, folder, failures):
     )
     impulses = effects.LEFT_OUT["impulses"]
     patch.setattr(
-        effects, "_loop", broken(effects._loop, lambda scene, world, variant: variant is impulses)
+        effects,
+        "run_loop",
+        broken(effects.run_loop, lambda scene, world, variant: variant is impulses),
     )
     found = effects.effects_of_scenes(nothing, failures)
     changes = {
-        row["effect"]: row["change"] for row in found["peg_corner"].records() if row["active"]
+        row["effect"]: row["without it"] for row in found["peg_corner"].records() if row["active"]
     }
-    assert (
-        list(found) == ["peg_corner"]
-        and changes.pop("impulses") is None
-        and None not in changes.values()
-    )
+    assert list(found) == [effects.STEPS, "peg_corner"] and len(found[effects.STEPS].rows) == 1
+    assert changes.pop("impulses") is None and None not in changes.values()
 
 
 def of_runs(patch, folder, failures):
@@ -361,7 +360,7 @@ def test_the_last_lines_say_what_failed_and_where_the_traceback_is(monkeypatch, 
     failures = tuple(failure_of(f"C{n:02d}", ValueError("planted\nand more")) for n in range(1, 23))
     recipes = (
         Recipe("hero", (), fails),
-        Recipe("film-corner", (), lambda: Drawn([Panel("<svg />", "alt")])),
+        Recipe("fig04", (), lambda: Drawn([Panel("<svg />", "alt")])),
     )
     monkeypatch.setattr(reproduce, "RECIPES", recipes)
     monkeypatch.setattr(

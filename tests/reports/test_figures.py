@@ -4,7 +4,6 @@ Figure 3."""
 import re
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
-from itertools import product
 from math import sin
 from types import SimpleNamespace
 
@@ -28,37 +27,24 @@ from tests.reports.made_up import made_motion
 from verification.check import Study
 from verification.complementarity.agreement import TWO_CONTACTS
 from verification.complementarity.landings import LANDINGS
-from verification.cost.accuracy import WAYS
-from verification.cost.calls import PRINTED
-from verification.cost.growth import FACTORED
+from verification.cost.growth import MILLISECOND, TITLES
 from verification.cost.trajectories import BELOW, OK, TIMED_OUT, WORLDS
-from verification.stability.port import COUPLINGS, EDGES
-from verification.stability.topic import contact_stability
+from verification.stability.port import COUPLINGS
 from verification.table import titled
 
 MOST_SERIES = 6
 OF_WORLDS = {(look.color, look.marker): names for names, look in LOOKS[:7] if look.marker}
 SCENES = tuple(f"scene {k}" for k in range(6))
 CHECKS = {
-    "stability": [check for check in contact_stability.checks if check is not EDGES],
     "complementarity": [TWO_CONTACTS, LANDINGS],
 }
-METHODS = (*WORLDS, "MuJoCo")
+METHODS = tuple(WORLDS)
 
 
 def tables():
     """Return a made-up table for each input of a figure that is a table and takes long to
     compute."""
     made = {
-        "C22/C22": (
-            "problem; contacts; ratio; lower quartile; upper quartile",
-            (
-                (problem, c, r, 0.97 * r, 1.03 * r)
-                for problem, power in (("a patch", 0.9), ("a pile", -0.05))
-                for c in (1, 2, 4, 8, 16, 64, 300)
-                for r in [c**power]
-            ),
-        ),
         "complementarity/map": (
             "impacts; kind; cases; agree; differ",
             (
@@ -115,56 +101,12 @@ def tables():
                 for step in (4.0, 1.0, 0.25)
             ),
         ),
-        "effect_costs": (
-            "scene; effect; time saved [%]; error [mm]; best of its error",
+        "haptic-rate/C19": (
+            "method; deadline; coordinates; contacts; time [µs]",
             (
-                (
-                    "peg_corner",
-                    effect,
-                    60.0 / (k + 1),
-                    10.0 ** (2 - k) if k < 4 else 0.0,
-                    "yes" if k % 2 else "no",
-                )
-                for k, effect in enumerate(
-                    ("hand_force", "wall_contacts", "coherence", "clustering", "friction")
-                )
-            ),
-        ),
-        "effect_steps": (
-            "scene; step [µs]; all on [µs]; shares of the step",
-            (
-                (
-                    scene,
-                    0.5 * (k + 1),
-                    0.8 * (k + 1),
-                    "friction 40 % (0.2 µs), coupling 20 % (0.1 µs)",
-                )
-                for k, scene in enumerate(SCENES)
-            ),
-        ),
-        "haptic-rate/budgets": (
-            "contacts; rank; budget [rows]; median residual; share of the loss; largest relative gain",
-            (
-                (6 * n, n, k, 0.5 * (1 - k / n), k / n, -0.1)
-                for n in (4, 8, 20)
-                for k in range(n + 1)
-            ),
-        ),
-        "haptic-rate/fitted": (
-            "method; axis; exponent; steepest from; to; there",
-            (
-                (method, axis, 0.9, 1000, 2000, 1.1)
-                for method in (FACTORED, PRINTED)
-                for axis in ("contacts", "coordinates")
-            ),
-        ),
-        "haptic-rate/scaling": (
-            "method; coordinates; contacts; time [µs]; lower quartile [µs]; upper quartile [µs]",
-            (
-                (method, d, c, t, 0.9 * t, 1.1 * t)
-                for k, method in enumerate((FACTORED, PRINTED))
-                for d, c in ((12, 50), (12, 300), (12, 2000), (3, 60), (24, 60), (96, 60))
-                for t in [10.0**k * d * c ** (0.9 + k)]
+                (method, MILLISECOND, d, c, 10.0**k * d * c ** (0.9 + k))
+                for k, method in enumerate(TITLES.values())
+                for d, c in ((12, 60), (12, 300), (12, 1200), (3, 60), (30, 60))
             ),
         ),
         "haptic-rate/motions": (
@@ -195,29 +137,8 @@ def tables():
                 for n in range(20)
             ),
         ),
-        "work_precision": (
-            "contacts; coordinates; problem; method; work; called; time [µs]; quartiles [µs]; "
-            "relative error; "
-            "relative energy gain; restitution residual; failed after [µs]; outcome",
-            precision_rows(),
-        ),
     }
     return {name: titled(columns.split("; "), rows) for name, (columns, rows) in made.items()}
-
-
-def precision_rows():
-    for (c, d), n, (k, way) in product(((1, 3), (60, 12)), range(9), enumerate(WAYS)):
-        lost, time, error = (
-            k == 4 and n == 8,
-            0.3 * c * (1.0 + 0.2 * k),
-            10.0 ** -(2 + 0.7 * k + 0.1 * n),
-        )
-        measured = (
-            (None, "", None, None, None, time, "too slow")
-            if lost
-            else (time, "", error, 1e-3 * (way.work == "1 sweep"), 0.0, None, "ok")
-        )
-        yield (c, d, f"problem {n}", way.method, way.work, way.called, *measured)
 
 
 def all_inputs():
@@ -227,7 +148,6 @@ def all_inputs():
         "corner": "peg_corner",
         "device": "peg_corner",
         "group": "arm_pushing",
-        "wall": "wall_1d",
     }
     runs = {
         name: made_motion(scenes[name.split("/")[0]], k)
@@ -256,7 +176,6 @@ def all_inputs():
         **computed,
         TILTED: tilted,
         "arm_energies": arm_energies(),
-        "machine": "a processor, report of today",
     }
 
 
@@ -317,7 +236,7 @@ def test_a_name_has_one_colour_and_one_marker_in_every_figure(gallery):
             )
         elif look in OF_WORLDS and line.get_linestyle() != "None":
             raise AssertionError((name, look))
-    assert seen >= {"ideal", "IAPB", "PB", "CBuc", "psaturated", "Lemke", "printed, numpy"}
+    assert seen >= {"ideal", "IAPB", "PB", "CBuc", "psaturated", "printed, numpy"}
     for figure in gallery.drawn:
         for text, look in figure.legend:
             assert (look.color, look.marker) == (
@@ -341,7 +260,7 @@ def test_a_plot_has_at_most_six_series_each_named_in_the_legend_in_a_style_of_it
         assert len(names) == 1 or names <= set(named), panel.label
 
 
-@pytest.mark.parametrize("key", ["hero", "fig05", "condition", "film-corner", "effect-costs"])
+@pytest.mark.parametrize("key", ["hero", "fig05", "condition"])
 def test_a_drawing_repeats_byte_for_byte(key, gallery):
     again = draw(next(recipe for recipe in RECIPES if recipe.key == key), gallery.inputs)
     assert again.panels and again.panels == gallery.figures[key].panels
@@ -364,13 +283,13 @@ def test_a_drawing_is_whole_asks_for_nothing_and_takes_the_colours_of_the_page(f
         len(row) == len(figure.numbers.columns) for row in figure.numbers.rows
     )
     said = figure.caption, *figure.said
-    assert len("".join(said)) > 80 and "{" not in "".join(said) and len(figure.said) in (0, 4)
+    assert len("".join(said)) > 80 and "{" not in "".join(said) and len(figure.said) in (0, 2)
 
 
 def test_a_table_is_html_in_the_page_and_in_its_own_file(gallery):
-    best = gallery.figures["which-method"]
-    [table] = [panel for panel in best.panels if panel.is_table]
-    assert {len(row) for row in ElementTree.fromstring(table.svg).iter("tr")} == {6}
+    best = gallery.figures["method-map"]
+    table = next(panel for panel in best.panels if panel.is_table)
+    assert len({len(row) for row in ElementTree.fromstring(table.svg).iter("tr")}) == 1
     assert standalone(best).startswith("<!DOCTYPE html>") and table.svg in standalone(best)
 
 

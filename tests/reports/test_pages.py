@@ -10,8 +10,10 @@ import pytest
 from jinja2 import UndefinedError
 
 from iapb.errors import ArgumentError
+from reports.crate import CRATE_NAME
 from reports.figures.figure import Figure, Panel, cell, grid
 from reports.figures.paper import arm_energies
+from reports.numbers_file import NUMBERS_NAME
 from reports.pages.builder import ROWS_SHOWN, _environment, build_report, draw_all, link_across
 from reports.pages.formulas import prose
 from reports.pages.numbers import ABSENT, num, numbers_of, percent, time, times
@@ -89,8 +91,20 @@ EVIDENCE = Evidence(
     ),
     effects={
         "peg": titled(
-            ("effect", "active", "reason", "left out", "cost", "change"),
-            [("gravity", False, "none in the scene", "", None, None)],
+            (
+                "effect",
+                "active",
+                "reason",
+                "left out",
+                "without it",
+                "position [mm]",
+                "energy [%]",
+            ),
+            [
+                ("gravity", False, "none in the scene", "", None, None, None),
+                ("friction", True, "a coefficient", "", "another motion", 2.5, 10.0),
+                ("touch", True, "walls", "", "same bits", 0.0, 0.0),
+            ],
         )
     },
     provenance={"commit": "abc"},
@@ -115,9 +129,8 @@ def test_each_page_is_well_formed_asks_for_nothing_and_runs_only_its_own_script(
         for link in set(outline.links) - {"data:,"}:
             file, mark, anchor = link.partition("#")
             assert not mark or anchor in outlines[(file or name).rpartition("/")[2]].ids, link
-            assert (
-                not file or (Path(name).parent / file).as_posix().replace("report/../", "") in pages
-            )
+            beside = (Path(name).parent / file).as_posix().replace("report/../", "")
+            assert not file or beside in (*pages, NUMBERS_NAME, CRATE_NAME)
         head = page.split("<main")[0]
         assert all(f"#{other.id}" in head for other in PAGES)
         (script,) = re.findall(r"<script>(.*?)</script>", page, flags=re.S)
@@ -181,6 +194,9 @@ def test_the_pages_show_the_records_escaped_and_counted():
         "KE never rises &lt;b&gt;",
         "Asked &lt;here&gt;.",
         "each of the 3 runs",
+        "is on: walls. Without it this run is the same to the last bit.",
+        "the position changes by up to 2.5 mm",
+        "is off: none in the scene.",
     ):
         assert text in page, text
 

@@ -28,8 +28,8 @@ from reference.one_thread import one_thread
 from verification.check import Check, Study
 from verification.complementarity.families import random_cases
 from verification.complementarity.of_runs import scene_impacts
+from verification.cost.impact_times import LONGEST
 from verification.cost.problems import patch, pile
-from verification.cost.solvers import LONGEST
 from verification.finding import Failure, Part, attempt
 from verification.hard_cases import HARD_CASES
 from verification.impacts import Floats

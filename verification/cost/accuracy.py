@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
-from itertools import product
 from numbers import Real
 from typing import Any, NamedTuple
 
@@ -24,13 +23,13 @@ from iapb.errors import ArgumentError, IapbError, MissingDependencyError
 from reference.exact import relative_energy_gain
 from reference.one_thread import one_thread
 from verification.check import Check, Study
-from verification.clock import sampler, seconds, take_turns, target
+from verification.clock import sampler, seconds, take_turns
 from verification.cost import calls
 from verification.cost.calls import PRINTED, Call
 from verification.cost.problems import random_impact
 from verification.finding import Failure, Part, attempt, counted
 from verification.impacts import TIMED_HARDNESS, Floats, ImpactCase, timed_problems
-from verification.table import Row, Table, table_from, titled
+from verification.table import Row, Table, table_from
 
 COMPILED, PYTHON = "compiled", "from Python"
 IAPB, SWEEPS, LEMKE = "IAPB", "Gauss-Seidel", "Lemke"
@@ -239,8 +238,6 @@ ACCURACY = Check(
     timed=MEASURED,
     timed_rows=True,
     digits=3,
-    note="Times are medians of the thread's CPU time; methods run in random order, each after a warm-up call. "
-    "Relative error: the distance of v⁺ from the exact v⁺ over |v⁻| (kinetic metric). Energy gain: 0 for a loss.",
 )
 
 
@@ -302,7 +299,6 @@ class Choice:
         )
 
 
-BUDGETS = (5e-7, 5e-6, 5e-5, 5e-4, 5e-3)  # [s]
 _EQUAL = 1e-9  # errors below this count as equal: the faster method is taken
 _MOST = 0.99  # a larger share of solved impacts than this counts as no better
 SOLVED = 1e-3  # relative error below which an impact counts as solved
@@ -411,103 +407,46 @@ def short_time(seconds_: float) -> str:
     return f"{1e3 * seconds_:.2g} ms" if seconds_ >= 1e-3 else f"{1e6 * seconds_:.3g} µs"
 
 
-CHOSEN = (
-    "contacts",
-    "coordinates",
-    "budget [µs]",
-    "method",
-    "work",
-    "time [µs]",
-    "error",
-    "largest error",
-    "share solved [%]",
-    "nearest",
-    "from Python",
-)
-
-
-def choices(measured: Table) -> Table:
-    """Return the result of `choose` for every measured size and every budget."""
-    rows, sizes = [], dict.fromkeys(measured.select(("contacts", "coordinates")).rows)
-    for (contacts, coordinates), budget in product(sizes, BUDGETS):
-        best, python = (
-            choose(measured, budget, contacts, coordinates, called) for called in (COMPILED, PYTHON)
-        )
-        row = dict.fromkeys(CHOSEN) | {
-            "contacts": contacts,
-            "coordinates": coordinates,
-            "budget [µs]": 1e6 * budget,
-            "method": "none",
-            "from Python": f"{python.method}, {short_time(python.time)}"
-            if python and python.enough
-            else "none",
-        }
-        if best and best.enough:
+def recommended(measured: Table) -> Table:
+    """Return for each measured size the fastest method with the most solved impacts, compiled and
+    from Python."""
+    rows = []
+    for contacts, coordinates in dict.fromkeys(measured.select(("contacts", "coordinates")).rows):
+        row: dict[str, Any] = {"contacts": contacts, "coordinates": coordinates}
+        for called in (COMPILED, PYTHON):
+            best = choose(measured, math.inf, contacts, coordinates, called)
             row |= {
-                "method": best.method,
-                "work": best.work,
-                "time [µs]": 1e6 * best.time,
-                "error": best.error,
-                "largest error": best.largest,
-                "share solved [%]": 100.0 * best.solved,
+                f"method, {called}": best and best.method,
+                f"work, {called}": best and best.work,
+                f"time, {called} [µs]": best and 1e6 * best.time,
+                f"largest error, {called}": best and best.largest,
             }
-        elif best:
-            row["nearest"] = f"{best.method}, {best.work}: {best.largest:.1g}"
         rows.append(row)
-    return table_from(
-        rows,
-        digits=2,
-        timed=CHOSEN[3:],
-        note=(
-            f"The compiled method, and the method called from Python, that solve most of the nine "
-            f"impacts to {SOLVED:g} in "
-            "time; ties as in the picture. Time and error are medians. None: no method solves "
-            "half of the "
-            "impacts; “nearest” is then the method that answers most impacts in time, with its "
-            "largest error."
-        ),
-    )
+    timed = [key for key in rows[0] if called_in(key)] if rows else ()
+    return table_from(rows, digits=2, timed=timed)
 
 
-def lost_to_rivals(measured: Table, called: str = COMPILED) -> Table:
-    """Return the impacts on which a complementarity solver is faster than IAPB at the same error or
-    1e-6.
+def called_in(key: str) -> bool:
+    """Return whether a column of `recommended` depends on times."""
+    return COMPILED in key or PYTHON in key
 
-    Both are compiled, or both are called from Python; there IAPB checks its arguments, and DAQP
-    does not.
-    """
-    rows = measured.where(called=called, outcome="ok").records()
-    ours = {
-        (row["contacts"], row["problem"]): row
-        for row in rows
-        if row["method"] == (IAPB if called == COMPILED else CALLED) and row["work"] == "all rows"
+
+def numbers_of(best: Table) -> Row:
+    """Return what the page quotes of `recommended`: IAPB's share, its times, and its errors."""
+    rows = best.records()
+    ours = [row for row in rows if row[f"method, {COMPILED}"] == IAPB]
+    if not ours:
+        return {"sizes": len(rows), "sizes_iapb": 0}
+    first, last = ours[0], ours[-1]
+    return {
+        "sizes": len(rows),
+        "sizes_iapb": len(ours),
+        "smallest_contacts": first["contacts"],
+        "smallest_us": first[f"time, {COMPILED}"],
+        "largest_contacts": last["contacts"],
+        "largest_us": last[f"time, {COMPILED}"],
+        "largest_error": max(row[f"largest error, {COMPILED}"] for row in ours),
     }
-    lost = []
-    for row in rows:
-        mine = ours[row["contacts"], row["problem"]]
-        good = (
-            row["relative error"] <= max(1e-6, mine["relative error"])
-            and row["relative energy gain"] <= NO_GAIN
-        )
-        if good and row["time"] < mine["time"] and row["method"] not in (IAPB, CALLED, PRINTED):
-            lost.append(
-                (
-                    row["contacts"],
-                    row["problem"],
-                    row["method"],
-                    row["work"],
-                    row["time"],
-                    mine["time"],
-                    mine["time"] / row["time"],
-                )
-            )
-    return titled(
-        ("contacts", "problem", "solver", "work", "time [µs]", "IAPB [µs]", "ratio"),
-        lost,
-        digits=3,
-        timed=("time [µs]", "IAPB [µs]", "ratio"),
-        timed_rows=True,
-    )
 
 
 TRUNCATED = ((6, 24), (12, 60), (30, 120))  # (d, c), rows of rank two thirds of d
@@ -550,28 +489,17 @@ def stopped(study: Study, case: Stopped) -> Row:
     }
 
 
-def _budgets_say(table: Table) -> Part:
-    rows = table.records()
-    gains = sum(row["largest relative gain"] > 0.0 for row in rows)
-    half = [100 * row["share of the loss"] for row in rows if row["budget"] == row["rank"] // 2]
-    return target(
-        "An impact that stops early, after a budget of rows (energy computed exactly)",
-        f"adds energy in {gains} of {len(rows)} combinations of size and budget. With half of the "
-        f"rows it takes "
-        f"{min(half):.0f} to {max(half):.0f} % of the energy that all rows take",
-        "never adds energy",
-        gains == 0,
-        timed=False,
-    )
+def budget_targets(table: Table) -> Iterator[Part]:
+    """Yield the number of combinations of size and row budget that add energy, judged exactly."""
+    gains = sum(gain > 0.0 for gain in table["largest relative gain"])
+    yield Part.on("sizes and row budgets that add energy", gains, 0)
 
 
 BUDGET_ROWS = Check(
     key="budgets",
     question="What does an impact give that stops early?",
     row=stopped,
-    says=_budgets_say,
+    targets=budget_targets,
     digits=3,
     cases=lambda _: [Stopped(d, c, k) for d, c in TRUNCATED for k in range((2 * d) // 3 + 1)],
-    note="Residual: max |Jᵢ v⁺ + e Jᵢ v⁻| / √(Jᵢ M⁻¹ Jᵢᵀ) over the contacts i, relative to |v⁻| in the kinetic "
-    "metric. Share of the loss: the energy lost, relative to the complete impact (median). A negative gain is a loss.",
 )

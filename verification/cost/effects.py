@@ -1,17 +1,15 @@
-"""The effects that a scene needs, the time of a step, the share of each effect in it, and the
-motion without it.
+"""The effects that a scene needs, the motion without each of them, and the time that the others
+save.
 
-Only this module measures the time of a scene's step in seconds; other modules give ratios of times.
-
-The variants run in turns: the scene with its effects, the scene with every switch on, and the scene
-without one of its effects. `LEFT_OUT` defines how an effect is left out: by other values of the
-scene, another law or coupling, a switch of the compiled step, or fewer pairs of shapes that may
-touch. Times are compared in each round, positions over the whole run.
+Times are compared on one and the same motion: with the effects that the scene needs, and with every
+effect that has a switch, which then changes nothing. `LEFT_OUT` defines how an effect is left out:
+by other values of the scene, another law or coupling, a switch of the compiled step, or fewer pairs
+of shapes that may touch. A motion without an effect is another motion, so its time is not compared.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from types import MappingProxyType
 from typing import Any
@@ -29,12 +27,13 @@ from iapb.scene import Scene, scene_names
 from iapb.simulation import Simulation
 from reference import Floats
 from reference.worlds import World, find_world
-from verification.clock import Times, take_turns
+from verification.clock import LEAST_ROUNDS, Times, take_turns
 from verification.cost.steps import RecordedLoop
 from verification.finding import Failure, attempt, counted
 from verification.table import Row, Table, table_from
 
 ROUNDS = 9  # number of rounds; each loop runs once per round
+SLOW = 0.5  # [s] a scene whose run takes longer has the least number of rounds
 SAMPLES = 400  # number of instants at which positions are compared
 
 
@@ -82,94 +81,42 @@ _OWN_ARRAYS = ("impact_friction", "implicit_contact", "supports", "touch")
 SWITCHED = tuple(
     name for name in engine.Switches._fields if name in EFFECT_NAMES and name not in _OWN_ARRAYS
 )
-_WHOLE, _ALL_ON = "with its effects", "all switched on"
-SCENES = ("peg_corner", "arm_pushing", "arm_obstacles")  # scenes whose effects are shown one by one
-_BELOW = "below the noise"
-NOTHING = "nothing in this run"  # first words for an effect that is on and changes nothing
-# Effects that act only through contacts: the kind of contact that they need ("": any), and the
-# words if there is none.
-_THROUGH_CONTACTS = {
-    "wall_contacts": ("wall", "no body touches a wall"),
-    "body_contacts": ("body", "no two separate bodies touch"),
-    "self_collisions": ("tree", "no two links of one tree touch"),
-} | dict.fromkeys(
-    (
-        "impulses",
-        "touch",
-        "unequal_restitution",
-        "penalty_stiffness",
-        "contact_damping",
-        "friction",
-        "clustering",
-        "coherence",
-    ),
-    ("", "nothing touches"),
-)
-
-
-# What is measured of an effect. It has no numbers if it is off, cannot be left out, or if the scene
-# cannot run without it; in the last case `change` gives the reason.
-MEASURED = (
-    "time saved [%]",  # share of the step that leaving the effect out saves; None within the noise
-    # largest distance of the tool (without a hand: of any body) from that with the effect
-    "position [mm]",
-    "device [mm]",  # the same distance of the device
-    "energy [%]",  # largest change of kinetic energy, relative to its largest value with the effect
-    "cost",
-    "change",
-)
+# What happens without an effect: the same states to the last bit, another motion, or no run at all.
+SAME, MOVES, STOPS = "same bits", "another motion", "no run"
 
 
 def effects_of_scenes(
     progress: Callable[[int, int], None] | None = None, failures: list[Failure] | None = None
 ) -> dict[str, Table]:
-    """Return the measured effects of each shipped scene in the IAPB world."""
-    names, found = scene_names(), dict[str, Table]()
+    """Return the effects of each shipped scene in the IAPB world, and under STEPS their times."""
+    names, found, rows = scene_names(), dict[str, Table](), list[Row]()
     for name in counted(names, progress) if progress else names:
-        measure = partial(_effects_of_shipped, name, failures)
-        table = attempt(name, measure, failures)
-        if table is not None:
-            found[name] = table
-    return found
+        measured = attempt(name, partial(_of_shipped, name, failures), failures)
+        if measured is not None:
+            found[name], times = measured
+            rows.append(times)
+    return {STEPS: steps_table(rows), **found}
 
 
-def _effects_of_shipped(name: str, failures: list[Failure] | None) -> Table:
-    return effects_of(load_scene(find_scene(name)), failures=failures)
+def _of_shipped(name: str, failures: list[Failure] | None) -> tuple[Table, Row]:
+    scene = load_scene(find_scene(name))
+    return effects_of(scene, failures=failures), step_of(scene)
 
 
-def effects_of(
-    scene: Scene, world: str = "IAPB", failures: list[Failure] | None = None, rounds: int = ROUNDS
-) -> Table:
-    """Return every effect of a scene; effects that are on and can be left out are measured.
+def effects_of(scene: Scene, world: str = "IAPB", failures: list[Failure] | None = None) -> Table:
+    """Return every effect of a scene, and what its run is without each effect that is on.
 
-    Step, all on: the time of the scene with its effects, and with all of SWITCHED on; the same in
-    each row. `failures` receives effects that raise an exception other than `IapbError`; if it is
-    None, the exception propagates.
+    `failures` receives effects that raise an exception other than `IapbError`; if it is None, the
+    exception propagates.
     """
     chosen = find_world(world)
     effects = decide_effects(scene, chosen.law, chosen.coupling_in(scene))
-    whole = Loop(scene, chosen)
-    tried: dict[str, Any] = {_ALL_ON: _loop(scene, chosen, {"switches": SWITCHED, "on": True})}
+    whole = run_loop(scene, chosen, {})
+    without: dict[str, Row] = {}
     for effect in effects:
-        if effect.active and effect.name in LEFT_OUT:
-            loop = partial(_loop, scene, chosen, LEFT_OUT[effect.name])
-            tried[effect.name] = attempt(f"{scene.name}, {effect.name}", loop, failures)
-    loops = {name: loop for name, loop in tried.items() if isinstance(loop, Loop)}
-    times = take_turns(
-        {_WHOLE: whole.sample} | {name: loop.sample for name, loop in loops.items()}, rounds
-    )
-    steps = {
-        "step [µs]": 1e6 * times[_WHOLE].median,
-        "all on [µs]": 1e6 * times[_ALL_ON].median,
-        "faster than real time [times]": scene.step / times[_WHOLE].median,
-    }
-    measured: dict[str, Row] = {
-        name: difference(whole, loop, name, times[name].over(times[_WHOLE]))
-        if isinstance(loop, Loop)
-        else {"change": f"without it no run: {loop}"}
-        for name, loop in tried.items()
-        if loop is not None and name != _ALL_ON
-    }
+        if effect.active and effect.name in LEFT_OUT and isinstance(whole, Loop):
+            tried = partial(_without, whole, scene, chosen, LEFT_OUT[effect.name])
+            without[effect.name] = attempt(f"{scene.name}, {effect.name}", tried, failures) or {}
     return table_from(
         (
             {
@@ -177,20 +124,33 @@ def effects_of(
                 "active": effect.active,
                 "reason": effect.reason,
                 "left out": effect.left_out,
-                **steps,
                 **dict.fromkeys(MEASURED),
-                **measured.get(effect.name, {}),
+                **without.get(effect.name, {}),
             }
             for effect in effects
         ),
         digits=3,
-        timed=(*steps, "time saved", "cost"),
-        prose=("reason", "left out", "cost", "change"),
+        prose=("reason", "left out"),
     )
 
 
-def _loop(scene: Scene, world: World, variant: Mapping[str, Any]) -> Loop | IapbError:
-    """Return the loop after its first run, or the error that stopped this run."""
+# What is measured of an effect that is on and can be left out.
+MEASURED = (
+    "without it",  # SAME, MOVES or STOPS
+    # largest distance of the tool (without a hand: of any body) from that with the effect
+    "position [mm]",
+    "device [mm]",  # the same distance of the device
+    "energy [%]",  # largest change of kinetic energy, relative to its largest value with the effect
+)
+
+
+def _without(whole: Loop, scene: Scene, world: World, variant: Mapping[str, Any]) -> Row:
+    other = run_loop(scene, world, variant)
+    return difference(whole, other) if isinstance(other, Loop) else {MEASURED[0]: STOPS}
+
+
+def run_loop(scene: Scene, world: World, variant: Mapping[str, Any]) -> Loop | IapbError:
+    """Return the loop after one run, or the error that stopped this run."""
     try:
         loop = Loop(scene, world, **variant)
         loop.sample()
@@ -199,110 +159,17 @@ def _loop(scene: Scene, world: World, variant: Mapping[str, Any]) -> Loop | Iapb
     return loop
 
 
-def saved(ratio: Times) -> float | None:
-    """Return the share of the step [%] that a loop saves; None if the difference is within the
-    noise.
-
-    `ratio` is the loop's time divided by the time with the effect, per round. The smallest and the
-    largest ratio are ignored. The difference is noise unless all other ratios are on the same side
-    of 1. With nine rounds, pure noise passes this test in one of 26 cases.
-    """
-    rounds = sorted(ratio.samples)
-    inner = rounds[1:-1] if len(rounds) > 2 else rounds
-    return None if inner[0] <= 1.0 <= inner[-1] else 100.0 * (1.0 - ratio.median)
-
-
-def summary(effects: Mapping[str, Table]) -> Table:
-    """Return the data of the figure of time and error, one row per scene and measured effect."""
-
-    def rows(scene: str, table: Table) -> Iterator[Row]:
-        measured = [
-            (row["time saved"] or 0.0, row["position"], row["effect"])
-            for row in table.records()
-            if row["position"] is not None
-        ]
-        for time, error, effect in measured:
-            beaten = any(
-                t >= time and e <= error and (t, e) != (time, error) for t, e, _ in measured
-            )
-            yield {
-                "scene": scene,
-                "effect": effect,
-                "time saved [%]": time,
-                "error [mm]": error,
-                "best of its error": "no" if beaten else "yes",
-            }
-
-    return table_from(
-        (row for given in effects.items() for row in rows(*given)),
-        digits=3,
-        timed=("time saved", "best of its error"),
-        note="Best of its error: no other effect saves more time with no larger error, or as much "
-        f"time with a smaller error. Time saved 0: {_BELOW}.",
-    )
-
-
-def steps(effects: Mapping[str, Table]) -> Table:
-    """Return the data of the figure of step times, one row per scene."""
-
-    def row(scene: str, table: Table) -> Row:
-        on = [row for row in table.records() if row["active"]]
-        first = on[0]
-        shares = sorted(
-            ((row["time saved"], row["effect"]) for row in on if (row["time saved"] or 0.0) > 0.0),
-            reverse=True,
-        )
-        told = ", ".join(
-            f"{effect.replace('_', ' ')} {share:.0f} % ({0.01 * share * first['step']:.2g} µs)"
-            for share, effect in shares
-        )
-        return {
-            "scene": scene,
-            "effects on": len(on),
-            "step [µs]": first["step"],
-            "all on [µs]": first["all on"],
-            "faster than real time [times]": first["faster than real time"],
-            "shares of the step": told or f"each {_BELOW}",
-        }
-
-    return table_from(
-        (row(*given) for given in effects.items()),
-        digits=3,
-        prose=("shares of the step",),
-        timed=("step", "all on", "faster than real time", "shares of the step"),
-        note=f"Medians of {ROUNDS} rounds. A share is the time that a step saves without the effect, "
-        "also because the motion changes; so shares need not add up to 100 %. Effects that are "
-        "not named "
-        f"are {_BELOW} or cannot be left out.",
-    )
-
-
-def difference(whole: Loop, other: Loop, name: str, ratio: Times) -> Row:
-    """Return the measured cells of one effect from the loops with it (`whole`) and without it
-    (`other`)."""
-    kinetic, share = whole.kinetic(), saved(ratio)
-    place, device = (
+def difference(whole: Loop, other: Loop) -> Row:
+    """Return the measured cells of one effect from the loops with it and without it."""
+    kinetic = whole.kinetic()
+    change = np.abs(other.kinetic() - kinetic).max() / max(kinetic.max(), np.finfo(float).tiny)
+    values = (
+        SAME if whole.same_motion(other) else MOVES,
         _farthest(whole.places(), other.places()),
         _farthest(whole.device_places(), other.device_places()),
+        100.0 * float(change),
     )
-    energy = 100.0 * float(
-        np.abs(other.kinetic() - kinetic).max() / max(float(kinetic.max()), np.finfo(float).tiny)
-    )
-    moved = f"position changes by up to {_length(place or 0.0)}"
-    moved += f", the device's by {_length(device)}" if device is not None else ""
-    change = f"{moved}; kinetic energy changes by up to {energy:.3g} % of its largest value"
-    if whole.same_motion(other):
-        kind, absent = _THROUGH_CONTACTS.get(name, ("", ""))
-        touching = whole.touching()
-        met = kind in touching if kind else bool(touching)
-        reason = "all states are the same to the last bit" if met or not absent else absent
-        change = f"{NOTHING}: {reason}"
-    cost = _BELOW if share is None else f"{share:+.0f} % of the step"
-    return dict(zip(MEASURED, (share, place, device, energy, cost, change), strict=True))
-
-
-def _length(millimetres: float) -> str:
-    return f"{millimetres:.3g} mm" if millimetres < 1e3 else f"{millimetres / 1e3:.3g} m"
+    return dict(zip(MEASURED, values, strict=True))
 
 
 def _farthest(one: Floats, other: Floats) -> float | None:
@@ -313,6 +180,92 @@ def _farthest(one: Floats, other: Floats) -> float | None:
         if one.shape == other.shape and one.size
         else None
     )
+
+
+STEPS = "time of a step"
+UNMOVED = 1e-6  # [mm] rounding of positions, where another order of sums is chosen
+TIMED = ("step", "all on", "saved", "saved, lower", "saved, upper", "noise", "clear")
+
+
+def step_of(scene: Scene, world: str = "IAPB", rounds: int = ROUNDS) -> Row:
+    """Time the step of a scene with its effects, again, and with all of SWITCHED on.
+
+    The motion is the same in all three, so their times compare. The second timing of the same step
+    is the noise: the larger quartile of its difference from the first.
+    """
+    chosen = find_world(world)
+    effects = decide_effects(scene, chosen.law, chosen.coupling_in(scene))
+    needed, again = Loop(scene, chosen), Loop(scene, chosen)
+    every = Loop(scene, chosen, switches=SWITCHED, on=True)
+    loops = {"needed": needed, "again": again, "every": every}
+    if needed.sample() * needed.steps > SLOW:
+        rounds = LEAST_ROUNDS
+    times = take_turns({name: loop.sample for name, loop in loops.items()}, rounds)
+    saved = _shares(times["needed"].over(times["every"]))
+    noise = max(map(abs, _shares(times["again"].over(times["needed"]))[1:]))
+    return {
+        "scene": scene.name,
+        "effects on": sum(effect.active for effect in effects),
+        "effects": len(effects),
+        "step [µs]": 1e6 * times["needed"].median,
+        "all on [µs]": 1e6 * times["every"].median,
+        "saved [%]": saved[0],
+        "saved, lower [%]": saved[1],
+        "saved, upper [%]": saved[2],
+        "noise [%]": noise,
+        "clear": saved[1] > noise,
+        "apart with all on [mm]": _farthest(needed.places(), every.places()),
+    }
+
+
+def _shares(ratio: Times) -> tuple[float, float, float]:
+    """Return median, lower and upper quartile of the time that is saved [%]."""
+    return tuple(100.0 * (1.0 - share) for share in (ratio.median, ratio.upper, ratio.lower))  # type: ignore[return-value]
+
+
+def steps_table(rows: Iterable[Row]) -> Table:
+    """Return the times of the steps, the largest saving first."""
+    ordered = sorted(rows, key=lambda row: -float(row["saved [%]"]))
+    return table_from(ordered, digits=3, timed=TIMED, timed_rows=True)
+
+
+def numbers_of(times: Table) -> Row:
+    """Return the main numbers of the page: effects that are on, and the time that the others
+    save."""
+    return {
+        "scenes": len(times.rows),
+        "effects_on": sum(times["effects on"]),
+        "effects": sum(times["effects"]),
+        "saved_median": 0.01 * float(np.median(times["saved"])),
+        "saved_least": 0.01 * min(times["saved"]),
+        "saved_most": 0.01 * max(times["saved"]),
+        "noise_median": 0.01 * float(np.median(times["noise"])),
+        "noise_largest": 0.01 * max(times["noise"]),
+        "clear_savings": sum(times["clear"]),
+        "apart_largest_mm": max(times["apart with all on"]),
+        "saves": bool(np.median(times["saved"]) > np.median(times["noise"])),
+        "alone": bool(max(times["apart with all on"]) <= UNMOVED),
+    }
+
+
+def matrix(effects: Mapping[str, Table]) -> Table:
+    """Return a row for each scene, and a column for each effect that some scene needs: "on",
+    "idle" (on, and without it the run has the same bits), or "off"."""
+    found = {
+        scene: {row["effect"]: row for row in table.records()} for scene, table in effects.items()
+    }
+    names = dict.fromkeys(name for rows in found.values() for name in rows)
+    needed = [name for name in names if any(rows[name]["active"] for rows in found.values())]
+    return table_from(
+        {"scene": scene} | {name: _state(rows[name]) for name in needed}
+        for scene, rows in found.items()
+    )
+
+
+def _state(row: Row) -> str:
+    if not row["active"]:
+        return "off"
+    return "idle" if row["without it"] == SAME else "on"
 
 
 class Loop(RecordedLoop):
@@ -354,15 +307,6 @@ class Loop(RecordedLoop):
         return all(
             np.array_equal(ours[name], theirs[name]) for name in ("q", "v", "device_q", "device_v")
         )
-
-    def touching(self) -> set[str]:
-        """Return the kinds of contacts in the last sample: "wall", "body" (two trees) and "tree"
-        (within one tree)."""
-        contacts = self.recording.joined("contacts")
-        a, b = contacts["body_a"], contacts["body_b"]
-        tree = self.simulation.system.mechanism.tree_of_body
-        kinds = np.where(b < 0, "wall", np.where(tree[a] == tree[np.maximum(b, 0)], "tree", "body"))
-        return set(np.unique(kinds).tolist())
 
     def states(self, name: str) -> Floats:
         """Return a recorded quantity at the compared instants."""

@@ -1,5 +1,5 @@
-"""Growth of one impact's time with contacts and coordinates; largest number of contacts within a
-step (claim C19)."""
+"""Growth of one impact's time with contacts and coordinates, and the largest number of contacts
+within a step (claim C19)."""
 
 from __future__ import annotations
 
@@ -10,84 +10,16 @@ from itertools import pairwise
 import numpy as np
 
 from reference.one_thread import one_thread
-from verification.check import Check, Study
-from verification.clock import TIMES, limited, sampler, seconds, take_turns, time_cells
+from verification.clock import LEAST_ROUNDS, sampler, seconds
 from verification.cost.calls import PRINTED, Call, kernel_call, printed_call
 from verification.cost.problems import random_impact
-from verification.finding import Failure, Part, attempt
+from verification.finding import Failure, attempt
 from verification.table import Row, Table
 
 FACTORED = "factored"  # the compiled kernel
-SIZES = (
-    *((12, c) for c in (50, 60, 100, 200, 300, 500, 1000, 2000, 5000)),
-    *((d, 60) for d in (3, 6, 24, 48, 96)),
-)  # (d, c)
-# largest number of contacts for the printed formula: with more, one pseudo-inverse takes seconds
-PRINTED_UP_TO = 500
-FACTORS = {
-    60: 10.0,
-    300: 100.0,
-}  # contacts at 12 coordinates -> target factor by which the printed formula is slower
+# contacts at 12 coordinates -> target factor by which the printed formula is slower
+FACTORS = {60: 10.0, 300: 100.0}
 LARGEST_EXPONENT = 1.1  # target, over contacts
-
-
-def scaling(study: Study, sizes: Sequence[tuple[int, int]]) -> list[Row]:
-    """Time the factored impact and the printed formula, over contacts and over coordinates.
-
-    The printed formula is timed up to PRINTED_UP_TO contacts. Every round times all sizes, so that
-    a temporary slowdown of the machine affects all sizes alike.
-    """
-    wanted = [
-        (method, d, c)
-        for d, c in sizes
-        for method in (FACTORED, PRINTED)
-        if method == FACTORED or c <= PRINTED_UP_TO
-    ]
-    name = "{0[0]}, d = {0[1]}, c = {0[2]}".format
-    with one_thread():
-        made = {
-            size: attempt(name(size), lambda size=size: sampler(_call(*size)), study.failures)  # type: ignore[misc]
-            for size in wanted
-        }
-        times = take_turns(
-            {size: call for size, call in made.items() if call is not None},
-            15 if study.depth == "full" else 7,
-            failures=study.failures,
-            name=name,
-        )
-    return [
-        {"method": method, "coordinates": d, "contacts": c, **time_cells(taken)}
-        for (method, d, c), taken in times.items()
-    ]
-
-
-def _call(method: str, d: int, c: int) -> Call:
-    case = random_impact(d, c, np.random.default_rng([d, c]))
-    call = kernel_call(case) if method == FACTORED else printed_call(case)
-    call()  # compiles the kernel and touches its arrays
-    return call
-
-
-def printed_over_factored(table: Table) -> Iterator[tuple[int, float, float, float]]:
-    """Yield (contacts, factored time [µs], printed time [µs], ratio) at d = 12, for the contacts of
-    FACTORS."""
-    for contacts in FACTORS:
-        here = table.where(coordinates=12, contacts=contacts)
-        times = dict(zip(here.column("method"), here.column("time"), strict=True))
-        if {FACTORED, PRINTED} <= set(times):
-            yield contacts, times[FACTORED], times[PRINTED], times[PRINTED] / times[FACTORED]
-
-
-def _scaling_says(table: Table) -> Iterator[Part]:
-    for contacts, ours, _, ratio in printed_over_factored(table):
-        yield limited(
-            f"with 12 coordinates and {contacts} contacts of rank 8 the printed formula takes",
-            ratio,
-            FACTORS[contacts],
-            " times as long as the engine's factored impact",
-            f" ({ours:.3g} µs)",
-            least=True,
-        )
 
 
 def power_law(sizes: Sequence[float], values: Sequence[float]) -> float:
@@ -104,60 +36,6 @@ def steepest(sizes: Sequence[float], values: Sequence[float]) -> tuple[float, fl
         for low, high in pairwise(pairs)
     )
     return low, high, slope
-
-
-def fitted(table: Table, method: str, axis: str) -> Row:
-    """Return the exponent of a method, and where it is steepest, over the contacts at d = 12 or the
-    coordinates at 60 contacts."""
-    chosen = table.where(
-        method=method, **({"coordinates": 12} if axis == "contacts" else {"contacts": 60})
-    )
-    sizes, times = chosen.column(axis), chosen.column("time")
-    low, high, there = steepest(sizes, times)
-    return {
-        "method": method,
-        "axis": axis,
-        "exponent": power_law(sizes, times),
-        "steepest from": low,
-        "to": high,
-        "there": there,
-    }
-
-
-def _growth_says(table: Table) -> Part:
-    [ours] = table.where(method=FACTORED, axis="contacts").records()
-    return limited(
-        "the time of the factored impact grows as the number of contacts to the power",
-        ours["exponent"],
-        LARGEST_EXPONENT,
-        " over all sizes",
-        " (steepest from {steepest from:g} to {to:g} contacts: {there:.2f})".format_map(ours),
-    )
-
-
-SCALING = Check(
-    key="scaling",
-    question="How does the time of an impact grow with its size?",
-    cases=lambda _: (SIZES,),
-    row=scaling,
-    says=_scaling_says,
-    timed=TIMES,
-    digits=3,
-    note="Random impacts; the rank of the rows is two thirds of the number d of coordinates.",
-)
-FITTED = Check(
-    key="fitted",
-    question="With which power does it grow?",
-    says=_growth_says,
-    digits=3,
-    cases=lambda _: [
-        (method, axis) for method in (FACTORED, PRINTED) for axis in ("contacts", "coordinates")
-    ],
-    row=lambda study, case: fitted(study.table(SCALING), *case),
-    timed=("exponent", "steepest from", "to", "there"),
-    note="The exponent is a least-squares fit of log time over log size. Steepest: the two neighbouring sizes between "
-    "which the exponent is largest; “there” is this exponent.",
-)
 
 
 PAPER_STEP, MILLISECOND = "1/512 s, the paper's step", "1 ms"
@@ -188,42 +66,45 @@ def haptic_rate(
     every deadline.
 
     The engine's method is tested at 1 kHz only. Yield one row per trial: the number of calls beyond
-    a deadline and the median time of a call. The rank of the rows is two thirds of d.
+    a deadline and the median time of a call. The rank of the rows is two thirds of d. Sizes up to
+    the largest of FACTORS are always timed, for their targets.
     """
     going = list(DEADLINES) if method == PRINTED else [MILLISECOND]
     for c in contacts:
-        with one_thread():
-            times = (
-                attempt(
-                    f"{c} contacts in {d} coordinates by {TITLES[method]}",
-                    partial(
-                        call_times, method, d, c, calls, max(map(DEADLINES.__getitem__, going))
-                    ),
-                    failures,
-                )
-                or []
-            )
+        name = f"{c} contacts in {d} coordinates by {TITLES[method]}"
+        longest = max(map(DEADLINES.__getitem__, going))
+        found = attempt(name, partial(call_times, method, d, c, calls, longest), failures)
+        times, typical = found or ([], np.nan)
         late = {name: sum(time > DEADLINES[name] for time in times) for name in going if times}
-        yield from (
-            {
+        for name, count in late.items():
+            yield {
                 "method": TITLES[method],
                 "deadline": name,
                 "coordinates": d,
                 "contacts": c,
-                "late calls [of 1000]": late[name],
-                "time [µs]": 1e6 * float(np.median(times)),
+                "late calls [of 1000]": count,
+                "time [µs]": 1e6 * typical,
             }
-            for name in late
-        )
-        going = [name for name in going if late.get(name, 0) <= ALLOWED]
-        if not going:
+        in_time = [name for name in going if late.get(name, 0) <= ALLOWED]
+        if not in_time and c >= max(FACTORS):
             return
+        going = in_time or going
 
 
-def call_times(method: str, d: int, c: int, calls: int, deadline: float) -> list[float]:
-    """Return the times of an attempt [s], which stops at more than ALLOWED late calls; it is the
-    first one in time, or the first whose median call is late, or the last."""
-    call = _call(method, d, c)
+@one_thread()
+def call_times(
+    method: str, d: int, c: int, calls: int, deadline: float
+) -> tuple[list[float], float]:
+    """Return the times of an attempt [s], each with the call from Python, and the typical time
+    without it.
+
+    An attempt stops at more than ALLOWED late calls; it is the first one in time, or the first
+    whose median call is late, or the last.
+    """
+    case = random_impact(d, c, np.random.default_rng([d, c]))
+    call: Call = kernel_call(case) if method == FACTORED else printed_call(case)
+    sample = sampler(call)
+    typical = float(np.median([sample() for _ in range(LEAST_ROUNDS)]))
     for _ in range(_ATTEMPTS):
         late, times = 0, list[float]()
         while len(times) < calls and late <= ALLOWED:
@@ -231,15 +112,16 @@ def call_times(method: str, d: int, c: int, calls: int, deadline: float) -> list
             late += times[-1] > deadline
         if late <= ALLOWED or np.median(times) > deadline:
             break
-    return times
+    return times, typical
 
 
-def most_contacts(trials: Table, deadline: str = MILLISECOND) -> dict[str, dict[int, int]]:
-    """Return the largest number of contacts in time, by method and coordinates; 0 if no size is in
-    time."""
-    most: dict[str, dict[int, int]] = {}
-    for row in trials.where(deadline=deadline).records():
-        best = most.setdefault(row["method"], {})
-        in_time = row["contacts"] if row["late calls"] <= ALLOWED else 0
-        best[row["coordinates"]] = max(best.get(row["coordinates"], 0), in_time)
-    return most
+def most_contacts(trials: Table, method: str, d: int, deadline: str = MILLISECOND) -> int:
+    """Return the largest number of contacts in time; 0 if no size is in time."""
+    rows = trials.where(deadline=deadline, method=TITLES[method], coordinates=d).records()
+    return max((row["contacts"] for row in rows if row["late calls"] <= ALLOWED), default=0)
+
+
+def times_over(trials: Table, method: str, axis: str, **held: int) -> list[tuple[int, float]]:
+    """Return the sizes along an axis, in order, and the times [µs] of a method there."""
+    rows = trials.where(method=TITLES[method], **held).records()
+    return sorted({row[axis]: row["time"] for row in rows}.items())

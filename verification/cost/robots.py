@@ -16,10 +16,9 @@ from iapb.mechanics.mechanism import Mechanism
 from reference.random_mechanisms import random_state
 from reference.rigid_body import calls_from_urdf
 from verification.check import Check, Study
-from verification.clock import limited, seconds, take_turns
-from verification.finding import NOT_COMPUTED, Part
+from verification.clock import seconds, take_turns
 from verification.mechanics.against_pinocchio import SEED, SHIPPED, robot_files
-from verification.table import Row, Table
+from verification.table import Row
 
 STATES = 200  # random states, one call each, in one round
 ROUNDS = {"quick": 25, "full": 200}
@@ -72,36 +71,11 @@ def _for_each(call: Callable[..., object], given: Sequence[tuple[object, ...]]) 
         call(*arguments)
 
 
-_WORDS = {"mass matrix": "mass matrix", "bias": "bias force (Coriolis and centrifugal)"}
-
-
-def _robots_say(table: Table) -> Iterator[Part]:
-    for form, limit in LIMITS.items():
-        rows = table.where(form=form).records() if table.rows else []
-        if not rows:
-            yield Part(
-                f"Mass matrix and bias compared with Pinocchio, {form}: not timed.",
-                NOT_COMPUTED,
-                timed=True,
-            )
-            continue
-        worst = max(rows, key=lambda row: float(row["ratio"]))
-        count = len({row["robot"] for row in rows})
-        yield limited(
-            f"the {_WORDS[worst['quantity']]} of the robot {worst['robot']}, {form}, takes",
-            worst["ratio"],
-            limit,
-            " times as long as Pinocchio's",
-            f" (the largest over M and B of {count} {table.note})",
-        )
-
-
 ROBOTS = Check(
     key="robots",
     question="How long do M and B take, compared with Pinocchio?",
     cases=lambda _: FILES,
     row=time_robot,
-    says=_robots_say,
     timed=("ours", "Pinocchio", "ratio", "lower quartile", "upper quartile"),
     digits=3,
     note="test robots of other projects" if OTHERS else "test robots of this project",

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from iapb.contact.kernels.broadphase import near_pairs
-from iapb.errors import installing
 from iapb.loop import make_record
 from iapb.recording import Recorder
 from iapb.scene import scene_from_text
@@ -24,10 +23,10 @@ from iapb.scene.mechanism import start_of
 from iapb.simulation import Simulation
 from reference.mujoco import MuJoCo, joint_places, set_state
 from verification.check import Check, Study
-from verification.clock import limited, take_turns, timed
-from verification.cost.growth import power_law, steepest
+from verification.clock import take_turns, timed
+from verification.cost.growth import power_law
 from verification.cost.resting import RESTING, RestingScene
-from verification.finding import NOT_COMPUTED, Part
+from verification.finding import Part
 from verification.table import Row, Table
 
 IDEAL = "ideal (QP per step)"  # in tables of times
@@ -74,10 +73,6 @@ STEPS, ROUNDS = (
 SOLVERS = ("Newton", "CG", "PGS")
 TARGETS = {"peg in the corner": 0.1}
 SPATIAL_TARGET = 0.5
-_DRIFT, STILL = (
-    "iapb's drift",
-    1e-6,
-)  # [m, rad] a scene that moves less while it is timed is at rest
 
 
 def race(study: Study, name: str, steps: int = STEPS) -> Iterator[Row]:
@@ -97,7 +92,8 @@ def race(study: Study, name: str, steps: int = STEPS) -> Iterator[Row]:
             "MuJoCo's contacts": other.contacts,
             "MuJoCo's step [µs]": 1e6 * times[solver].median,
             "ratio": ratio.median,
-            "quartiles": f"{ratio.lower:.2g} to {ratio.upper:.2g}",
+            "lower quartile": ratio.lower,
+            "upper quartile": ratio.upper,
             "target": TARGETS.get(name, SPATIAL_TARGET),
             "iapb's drift": ours.moved,
             "MuJoCo's drift": other.moved,
@@ -112,27 +108,6 @@ def hardest(races: Table) -> list[Row]:
     ):
         fastest.setdefault(row["scene"], row)
     return list(fastest.values())
-
-
-def _races_say(races: Table) -> Iterator[Part]:
-    if not races.rows:
-        yield Part(
-            f"Time of a step compared with MuJoCo: MuJoCo is not installed: {installing('reference')}.",
-            NOT_COMPUTED,
-            timed=True,
-        )
-    for worst in hardest(races):
-        moved = worst.get(_DRIFT) or 0.0
-        rest = "at rest" if moved < STILL else f"nearly at rest (moving by {moved:.1g} rad)"
-        yield limited(
-            f"with the {worst['scene']} {rest}, our step takes",
-            worst["ratio"],
-            worst["target"],
-            " times as long as MuJoCo's",
-            " (MuJoCo: solver {MuJoCo's solver}, "
-            "{MuJoCo's contacts:.0f} contacts; engine: {iapb's contacts:.0f} "
-            "contacts)".format_map(worst),
-        )
 
 
 class OwnLoop:
@@ -198,18 +173,16 @@ RACES = Check(
     key="steps against MuJoCo",
     question="How long is a step, compared with MuJoCo's?",
     row=race,
-    says=_races_say,
     cases=lambda _: RESTING if find_spec("mujoco") else (),
     digits=3,
-    timed=("MuJoCo's step", "ratio", "quartiles", "iapb's drift", "MuJoCo's drift"),
-    note="Both engines simulate the same masses, forces and time step (peg: 1/512 s, others 1 ms) without friction. "
-    "MuJoCo runs with each of its solvers, otherwise with the settings of the world mujoco; the "
-    "findings name its "
-    "fastest solver. Ratio: "
-    "time of iapb's step, which includes its recording, over that of MuJoCo's step; median of the "
-    "rounds. Contacts: "
-    "means over the timed steps. Drift: the largest change of a coordinate during the timed steps "
-    "[m, rad].",
+    timed=(
+        "MuJoCo's step",
+        "ratio",
+        "lower quartile",
+        "upper quartile",
+        "iapb's drift",
+        "MuJoCo's drift",
+    ),
 )
 
 
@@ -284,36 +257,15 @@ def _tested(simulation: Simulation) -> int:
     return int(near_pairs(world.broad_phase, body.rotation, body.position, 0.0))
 
 
-def _bodies_say(table: Table) -> Iterator[Part]:
+def body_targets(table: Table) -> Iterator[Part]:
+    """Yield the powers with which the time of a step and the number of tested pairs grow."""
     rows = [row for row in table.records() if row["bodies"] >= LEAST_BODIES]
     bodies, times, pairs = (
         [row[key] for row in rows] for key in ("bodies", "step", "pairs tested")
     )
-    power, more = power_law(bodies, times), ""
-    if len(rows) > 2:
-        low, high, slope = steepest(bodies, times)
-        more = (
-            f"; the time grows fastest from {low:g} to {high:g} bodies, with the power {slope:.2f}"
-        )
-    yield limited(
-        f"from {LEAST_BODIES} free bodies on, the time of a step grows as the number of bodies to "
-        f"the "
-        "power",
-        power,
-        LARGEST_POWER,
-        "",
-        more,
-    )
-    last = rows[-1]
-    yield limited(
-        "the number of tested pairs of shapes grows as the number of bodies to the power",
-        power_law(bodies, pairs),
-        LARGEST_POWER,
-        "",
-        f" ({last['pairs tested']:.0f} of "
-        f"{last['pairs of shapes']:,} pairs for {last['bodies']} free bodies)",
-        timed=False,
-    )
+    time = power_law(bodies, times)
+    yield Part.on("power of the time of a step over bodies", time, LARGEST_POWER, timed=True)
+    yield Part.on("power of the tested pairs over bodies", power_law(bodies, pairs), LARGEST_POWER)
 
 
 BODIES = Check(
@@ -321,8 +273,7 @@ BODIES = Check(
     question="How does the time of a step grow with the number of free bodies?",
     cases=lambda _: COUNTS,
     row=step_of_bodies,
-    says=_bodies_say,
+    targets=body_targets,
     timed=("step",),
     digits=3,
-    note="Discs near a wall. Contacts: means.",
 )

@@ -10,18 +10,16 @@ in the table. If an error is below the error bound of the truth, the row has thi
 its note says so. No scene has an impact at a multiple of a step, because there a run would be exact
 by chance.
 
-`curves` computes the cost of ten times the accuracy for each world and scene, and the figure shows
-the same curves. A cost is never extrapolated: it is fitted only to runs that themselves span ten
-times the accuracy. `worth` summarizes the curves of each world.
+`worth` computes the cost of ten times the accuracy for each world. A cost is never extrapolated: it
+is fitted only to runs that themselves span ten times the accuracy.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
 from importlib.util import find_spec
-from math import inf
+from math import hypot, inf, log, pi
 from pathlib import Path
 from typing import Any
 
@@ -38,9 +36,9 @@ from reference.one_thread import one_thread
 from reference.scene_events import scene_truth
 from reference.worlds import find_world
 from verification.check import Check, Study
-from verification.clock import target, timed
+from verification.clock import timed
 from verification.cost.steps import IDEAL, RecordedLoop
-from verification.finding import Part, attempt
+from verification.finding import attempt
 from verification.table import Row, Table
 
 FOLDER = Path(__file__).with_name("scenes") / "motions"
@@ -103,71 +101,8 @@ def motions_of(study: Study, name: str) -> Iterator[Row]:
 # a run belongs to a fit if its error is at least this many times smaller than that of the run
 # before it
 GAINED = 1.5
-# [lengths] a run with a larger error is on no front: the coarsest step of any method is the fastest
-# run
-USEFUL = 0.1
-FIT_RUNS, FIT_FALL = (
-    3,
-    10.0,
-)  # a power is fitted to no fewer runs and no smaller fall of the error: no extrapolation
-_LEAST_FALL = 3.0  # with a smaller fall of the error it is said to stay
-
-
-@dataclass(frozen=True)
-class Curve:
-    """One world on one scene; runs are in the order of their steps, from the coarsest to the
-    finest.
-
-    Attributes
-    ----------
-    runs : all runs.
-    used : those along which the error falls, for `words`; () if it falls less than threefold.
-    cost : factor in computing time for a tenth of the error, fitted to `used`; None if these are
-        too few (FIT_RUNS) or span too little (FIT_FALL).
-    front : runs with a useful error such that no other run of the scene is better in both time and
-        error.
-    least : the smallest error of position, without runs that are exact by chance.
-    too_few : whether there are no runs to use because finer steps would take too long.
-    cut_short : whether the error still falls at the finest step that was run, and finer steps would
-        take too long.
-    """
-
-    scene: str
-    method: str
-    runs: tuple[Record, ...]
-    used: tuple[Record, ...]
-    cost: float | None
-    front: tuple[Record, ...]
-    least: float
-    too_few: bool
-    cut_short: bool
-
-    @property
-    def left_out(self) -> list[Record]:
-        """The other runs: before the error falls, after it stops falling, or exact by chance
-        (`by_chance`)."""
-        return [run for run in self.runs if run not in self.used]
-
-    @property
-    def words(self) -> str:
-        """The cost of ten times the accuracy, or what was measured without a fit, as a label of the
-        curve."""
-        if not self.used:
-            return "too few runs" if self.too_few else f"stays at {self.least:.2g}"
-        first, last = self.used[0], self.used[-1]
-        level = any(run["step"] < last["step"] and not by_chance(run) for run in self.left_out)
-        told = f"{times(first['position'] / last['position'])} costs {times(last['time'] / first['time'])}"
-        told = (
-            f"{told} ({len(self.used)} runs)"
-            if self.cost is None
-            else f"10× costs {times(self.cost)}"
-        )
-        return told + ", then level" * level
-
-
-def times(factor: float) -> str:
-    """Return a factor as short text, for example 3.4× or 49×."""
-    return f"{factor:.2g}×" if factor < 10.0 else f"{factor:.0f}×"
+# a power is fitted to no fewer runs and no smaller fall of the error: no extrapolation
+FIT_RUNS, FIT_FALL = 3, 10.0
 
 
 def by_chance(run: Row) -> bool:
@@ -176,44 +111,11 @@ def by_chance(run: Row) -> bool:
     return "position" in run["note"] and str(run["note"]).endswith(BELOW)
 
 
-def curves(motions: Table) -> list[Curve]:
-    """Return a curve for each scene and each world that has a run."""
-    found: list[Curve] = []
-    for scene in dict.fromkeys(motions.column("scene")):
-        here = sorted(
-            (run for run in motions.where(scene=scene, outcome=OK).records() if run["time"] > 0.0),
-            key=lambda run: -float(run["step"]),
-        )
-        honest = [run for run in here if not by_chance(run)]
-        for method in dict.fromkeys(motions.column("method")):
-            runs = [run for run in honest if run["method"] == method]
-            if not runs:
-                continue
-            kept = falling(runs)
-            used = kept if kept[0]["position"] >= _LEAST_FALL * kept[-1]["position"] else []
-            late = bool(motions.where(scene=scene, method=method, outcome=TIMED_OUT).rows)
-            found.append(
-                Curve(
-                    scene,
-                    method,
-                    tuple(run for run in here if run["method"] == method),
-                    tuple(used),
-                    tenfold_cost(used),
-                    tuple(
-                        run
-                        for run in runs
-                        if run["position"] <= USEFUL
-                        and not any(
-                            one["time"] < run["time"] and one["position"] < run["position"]
-                            for one in honest
-                        )
-                    ),
-                    float(min(run["position"] for run in runs)),
-                    not used and late and len(kept) == len(runs),
-                    late and kept[-1] is runs[-1],
-                )
-            )
-    return found
+def runs_of(motions: Table, **chosen: str) -> list[Record]:
+    """Return the finished runs of a scene or a method, coarse to fine, without those that are exact
+    by chance."""
+    runs = motions.where(outcome=OK, **chosen).records()
+    return sorted((run for run in runs if not by_chance(run)), key=lambda run: -float(run["step"]))
 
 
 def falling(runs: Sequence[Record]) -> list[Record]:
@@ -222,7 +124,7 @@ def falling(runs: Sequence[Record]) -> list[Record]:
 
     The first of them is the last run before the error falls.
     """
-    kept = [runs[0]]
+    kept = list(runs[:1])
     for run in runs[1:]:
         if run["position"] * GAINED <= kept[-1]["position"]:
             kept.append(run)
@@ -243,52 +145,96 @@ def tenfold_cost(runs: Sequence[Record]) -> float | None:
     return float(10.0 ** (-1.0 / np.polyfit(time, error, 1)[0]))
 
 
-def worth(motions: Table) -> Table:
-    """Return for each world its errors over all scenes, its cost of ten times the accuracy, and its
-    best scenes.
+def worth(motions: Table, method: str) -> Row:
+    """Return the cost of ten times the accuracy, and the smallest errors, of one world.
 
-    The cost is the median over the scenes on which it can be fitted (see `Curve.cost`). "Error
-    stays" is the number of scenes on which the error does not fall. "Best for its time" is the
-    number of scenes in which the world is on the front with an error of at most USEFUL. "Cut short"
-    is the number of scenes in which the world might still reach the front with steps that would
-    take too long.
+    The cost is the median over the scenes on which it can be fitted. A world has the smallest error
+    of a scene if no run of another world has a smaller one.
     """
-    rows, by_method = list[Row](), dict[str, list[Curve]]()
-    worlds = [*dict.fromkeys(motions.column("method"))]
-    for curve in sorted(curves(motions), key=lambda curve: worlds.index(curve.method)):
-        by_method.setdefault(curve.method, []).append(curve)
-    for method, mine in by_method.items():
-        costs = [curve.cost for curve in mine if curve.cost is not None]
-        front = [run["position"] for curve in mine for run in curve.front]
-        rows.append(
-            {
-                "method": method,
-                "called": "compiled" if method in COMPILED else "from Python",
-                "tenfold accuracy costs": float(np.median(costs)) if costs else None,
-                "least cost": min(costs, default=None),
-                "largest cost": max(costs, default=None),
-                "scenes fitted": len(costs),
-                "error stays": sum(not curve.used and not curve.too_few for curve in mine),
-                "least error": float(np.median([curve.least for curve in mine])),
-                "best for its time [scenes]": sum(bool(curve.front) for curve in mine),
-                "scenes": len(mine),
-                "most exact there": min(front, default=None),
-                "least exact there": max(front, default=None),
-                "energy made": max(run["energy made"] for curve in mine for run in curve.runs),
-                "cut short [scenes]": sum(curve.cut_short for curve in mine),
-                "failed [runs]": sum(
-                    run["outcome"] != OK for run in motions.where(method=method).records()
-                ),
-            }
+    scenes = dict.fromkeys(motions.column("scene"))
+    costs, least, first = list[float](), list[float](), 0
+    for scene in scenes:
+        mine = runs_of(motions, scene=scene, method=method)
+        if not mine:
+            continue
+        least.append(min(run["position"] for run in mine))
+        first += least[-1] <= min(run["position"] for run in runs_of(motions, scene=scene))
+        cost = tenfold_cost(falling(mine))
+        if cost is not None:
+            costs.append(cost)
+    made = motions.where(method=method, outcome=OK).column("energy made")
+    return {
+        "method": method,
+        "called": "compiled" if method in COMPILED else "from Python",
+        "tenfold accuracy costs [times]": float(np.median(costs)) if costs else None,
+        "least cost [times]": min(costs, default=None),
+        "largest cost [times]": max(costs, default=None),
+        "scenes fitted": len(costs),
+        "least error, median [lengths]": float(np.median(least)) if least else None,
+        "smallest error of all [scenes]": first,
+        "scenes": len(scenes),
+        "energy made": max(made, default=None),
+        "failed or too slow [runs]": len(motions.where(method=method).rows) - len(made),
+    }
+
+
+def aims(motions: Table) -> Iterator[Row]:
+    """Yield for each scene our smallest error over that of the best other world, and our time over
+    MuJoCo's at MuJoCo's smallest error.
+
+    Our worlds are those of `OURS`. None: we never reach that error.
+    """
+    for scene in dict.fromkeys(motions.column("scene")):
+        runs = runs_of(motions, scene=scene)
+        ours = [run for run in runs if run["method"] in OURS]
+        others = [run for run in runs if run["method"] not in OURS]
+        theirs = min(
+            (run for run in others if run["method"] == MUJOCO),
+            key=lambda run: (run["position"], run["time"]),
+            default=None,
         )
-    return WORTH.table_of(rows)
+        if not ours or not others:
+            continue
+        least = min(others, key=lambda run: float(run["position"]))
+        yield {
+            "scene": scene,
+            "most exact other": least["method"],
+            "error": min(run["position"] for run in ours) / least["position"],
+            "time": None
+            if theirs is None
+            else min(
+                (run["time"] for run in ours if run["position"] <= theirs["position"]), default=inf
+            )
+            / theirs["time"],
+        }
 
 
-def _our_world(name: str) -> World:
-    """Return one of our worlds, timed in its loop."""
+LOWEST = 1e-3  # restitution below which the walls are damped critically
+
+
+def stiffened(scene: Scene) -> Scene:
+    """Return the scene with walls as stiff as its step allows, damped to its restitution.
+
+    A collision of the lightest body at one contact takes eight steps. Where n contacts share a
+    collision, the walls are n times too stiff and the restitution is too small.
+    """
+    mass, e = min(body.mass for body in scene.bodies), scene.contact.restitution
+    frequency = pi / (8.0 * scene.step)
+    damping = 1.0 if e < LOWEST else -log(e) / hypot(pi, log(e))
+    return scene.with_values(
+        {
+            "contact.stiffness": mass * frequency**2,
+            "contact.damping": 2.0 * damping * mass * frequency,
+        }
+    )
+
+
+def _our_world(name: str, stiff: bool = False) -> World:
+    """Return one of our worlds, timed in its loop; `stiff` uses the walls of `stiffened`."""
 
     def run(scene: Scene) -> tuple[Run, float]:
-        loop = RecordedLoop(Simulation(scene, find_world(name).law), scene.steps)
+        given = stiffened(scene) if stiff else scene
+        loop = RecordedLoop(Simulation(given, find_world(name).law), scene.steps)
         seconds = loop.sample() * loop.steps
         return loop.recording.run(name, ""), seconds
 
@@ -302,14 +248,18 @@ def _mujoco(scene: Scene) -> tuple[Run, float]:
     return run, float(run.chunk_seconds.sum())
 
 
-COMPILED = ("IAPB", "PB")
+STIFF_IAPB, STIFF_PB, MUJOCO = "IAPB, stiff springs", "PB, stiff springs", "MuJoCo"
+OURS = ("IAPB", STIFF_IAPB)
+COMPILED = (*OURS, STIFF_PB)
 # To add a world, add a line here.
 WORLDS: dict[str, World] = {
-    **{name: _our_world(name) for name in COMPILED},
+    "IAPB": _our_world("IAPB"),
+    STIFF_IAPB: _our_world("IAPB", stiff=True),
+    STIFF_PB: _our_world("PB", stiff=True),
     IDEAL: _our_world("ideal"),
 }
 if find_spec("mujoco"):
-    WORLDS["MuJoCo"] = _mujoco
+    WORLDS[MUJOCO] = _mujoco
 
 
 def over_steps(
@@ -410,113 +360,28 @@ class Judge:
         return np.concatenate([center, center + turned.reshape(center.shape)], axis=1)
 
 
-def _motions_say(motions: Table) -> Iterator[Part]:
-    """Yield one part per scene with the best errors, and our fastest time at MuJoCo's best
-    accuracy."""
-    for scene in dict.fromkeys(motions.where(outcome=OK).column("scene")):
-        here = motions.where(scene=scene, outcome=OK).records()
-        best = {
-            name: min(chosen, key=lambda run: (run["position"], run["time"]))
-            for name in dict.fromkeys(run["method"] for run in here)
-            if (chosen := [run for run in here if run["method"] == name])
-        }
-        ours, theirs, most = (
-            best["IAPB"],
-            best.get("MuJoCo"),
-            min(best, key=lambda name: float(best[name]["position"])),
-        )
-        as_good = min(
-            (
-                run["time"]
-                for run in here
-                if theirs and run["method"] == "IAPB" and run["position"] <= theirs["position"]
-            ),
-            default=inf,
-        )
-        exact, fast = (
-            ours["position"] <= best[most]["position"],
-            theirs is None or as_good <= theirs["time"],
-        )
-        text = "; ".join(
-            f"{name}: {_error(run)} ({_took(run['time'])})" for name, run in best.items()
-        )
-        more = f". IAPB reaches MuJoCo's error in {_took(as_good)}" if as_good < inf else ""
-        yield target(
-            f"Whole motion ({scene}): the smallest position error that any tried time step "
-            f"reaches, in % of "
-            "the body's length (and the computing time per simulated second)",
-            f"{text}{more}",
-            "IAPB has the smallest error, and reaches MuJoCo's error in less time than MuJoCo",
-            exact and fast,
-            f"in the whole motion “{scene}” "
-            + (
-                "another method is as exact in less time"
-                if exact
-                else f"no time step makes IAPB as exact as {most} (smallest errors {_error(ours)} and "
-                f"{_error(best[most])} of the body's length)"
-            ),
-        )
-
-
-def _took(milliseconds: float) -> str:
-    return f"{milliseconds:.3g} ms" if milliseconds < 1000.0 else f"{milliseconds / 1000.0:.3g} s"
-
-
-def _error(run: Row) -> str:
-    return (
-        f"{BELOW} of {100 * run['position']:.2g} %"
-        if by_chance(run)
-        else f"{100 * run['position']:.2g} %"
-    )
-
-
 MOTIONS = Check(
     key="motions",
     question="What does the accuracy of a whole motion cost?",
     cases=lambda _: TRAJECTORY_SCENES,
     row=motions_of,
-    says=_motions_say,
     timed=("time", "outcome", "note"),
     digits=3,
-    note="The truth is an event-driven solution with rigid walls. In the corner a constant force compresses the "
-    "springs of IAPB and PB, and no time step removes the error that this causes. Time: computing "
-    "time per simulated "
-    "second. Position error: the largest distance from the truth, sampled every millisecond. "
-    "Energy error: the error "
-    "at the end, as size and with its sign. Energy made: the largest rise above the energy at the "
-    "start. Energies are "
-    "relative to the largest kinetic energy. An error below the error bound of the truth is "
-    "replaced by this bound.",
 )
 WORTH = Check(
     key="worth",
-    question="Which world is worth its time?",
-    row=lambda _, row: row,
+    question="What does ten times the accuracy cost?",
+    cases=lambda _: WORLDS,
+    row=lambda study, world: worth(study.table(MOTIONS), world),
     digits=2,
-    cases=lambda study: worth(study.table(MOTIONS)).by_title(),
     timed=(
         "tenfold accuracy costs",
         "least cost",
         "largest cost",
         "scenes fitted",
-        "error stays",
-        "least error",
-        "best for its time",
-        "scenes",
-        "most exact there",
-        "least exact there",
+        "least error, median",
+        "smallest error of all",
         "energy made",
-        "cut short",
-        "failed",
+        "failed or too slow",
     ),
-    note="Errors are position errors in body lengths. The factor in time for a tenth of the error is a median over "
-    "the scenes. It is fitted to consecutive time steps between which the error falls by a factor "
-    "of at least "
-    f"{GAINED:g}; a fit needs {FIT_RUNS} runs and a total fall by a factor of {FIT_FALL:g}. Best "
-    f"for its time: scenes "
-    f"with a run (error up to {USEFUL:g}) such that no other run is both faster and more "
-    f"accurate. Energy made: the "
-    "largest rise above the energy at the start, relative to the largest kinetic energy. Failed: "
-    "also runs that are "
-    "too slow.",
 )

@@ -2,7 +2,7 @@
 const numbers = (text) => text.split(" ").map(Number);
 const add = (parent, name, properties) => parent.appendChild(Object.assign(document.createElement(name), properties));
 const told = (value, range) => value.toFixed(Math.min(Math.max(0, 3 - Math.floor(Math.log10(Math.abs(range)))), 7)).replace("-", "−");
-const controlsOf = (figure, where) => figure.querySelector(".panels").insertAdjacentElement(where,
+const controlsOf = (figure) => figure.querySelector(".panels").insertAdjacentElement("beforebegin",
   Object.assign(document.createElement("div"), { className: "controls" }));
 
 // A drawing over time: its frame [left, top, right, bottom] in points, the limits of its axes, and the points of its curves.
@@ -57,41 +57,16 @@ document.querySelectorAll("figure").forEach((figure) => {
       });
     });
   });
-  const [states, films] = ["[data-state]", "svg[data-duration]"].map((each) => [...figure.querySelectorAll(each)]);
+  const states = [...figure.querySelectorAll("[data-state]")];
   if (states.length) { // pictures, of which a slider shows one
     const { state: value } = states.find((state) => !state.hasAttribute("display")).dataset;
     const tilts = states.flatMap((state) => state.textContent.match(/[\d.]+°/) ?? []);
-    const label = add(controlsOf(figure, "beforebegin"), "label", { textContent: `Tilt from ${tilts[0]} ` });
+    const label = add(controlsOf(figure), "label", { textContent: `Tilt from ${tilts[0]} ` });
     const slider = add(label, "input", { type: "range", min: 0, max: states.at(-1).dataset.state, value });
     label.append(` to ${tilts.at(-1)}`);
     slider.addEventListener("input", () => states.forEach((state) => state.setAttribute("display", state.dataset.state === slider.value ? "inline" : "none")));
   }
-  if (films.length) play(films, controlsOf(figure, "afterend"));
 });
-
-// The films of a figure share one slider; without this script they play by themselves, again and again.
-function play(films, controls) {
-  const [end, slower, start] = ["duration", "slower", "start"].map((name) => +films[0].dataset[name]);
-  const button = add(controls, "button", { type: "button" }), slider = add(controls, "input",
-    { type: "range", min: 0, max: end, step: end / 1000, ariaLabel: "Time" });
-  const clock = add(controls, "output", {});
-  const tell = (time) => { slider.value = time; clock.textContent = `${time.toFixed(3)} s, 1 : ${slower}`; };
-  const pause = () => { films.forEach((film) => film.pauseAnimations()); button.textContent = "▶ Play"; };
-  const seek = (time) => { films.forEach((film) => film.setCurrentTime(Math.min(time, 0.9999 * end) * slower)); tell(time); };
-  const follow = () => {
-    if (films[0].animationsPaused()) return;
-    const time = films[0].getCurrentTime() / slower;
-    if (time >= end) { pause(); seek(end); } else { tell(time); requestAnimationFrame(follow); }
-  };
-  button.addEventListener("click", () => {
-    if (!films[0].animationsPaused()) return pause();
-    if (+slider.value >= end) seek(start);
-    films.forEach((film) => film.unpauseAnimations()), button.textContent = "❚❚ Pause";
-    requestAnimationFrame(follow);
-  });
-  slider.addEventListener("input", () => { pause(); seek(+slider.value); });
-  pause(), seek(start);
-}
 
 // A link into something folded unfolds it.
 const unfold = () => {

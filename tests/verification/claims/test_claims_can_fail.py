@@ -22,6 +22,7 @@ LEAKS = {"hand draws energy": True}
 TIGHT = {"hand draws energy": False}
 
 # claims -> a row, and what the rule says of it
+TIMED = {"ratio": 0.5, "apart": 0.0}
 ROWS = [
     *(
         ("C01 C02 C03 C04 C05 C06 C08", LOSS | {"error": error, "bound": 1e-12}, held)
@@ -102,8 +103,13 @@ ROWS = [
     ("C21", SETTLED | {"penalty settles after": 0.1}, True),
     ("C21", SETTLED | {"impulses settle after": np.inf, "penalty settles after": 0.1}, False),
     ("C21", SETTLED | {"impulses settle after": np.inf, "penalty settles after": np.inf}, None),
-    ("C22", {"ratio": 1.3, "lower quartile": 1.11, "upper quartile": 4.0}, True),
-    ("C22", {"ratio": 0.8, "lower quartile": 0.2, "upper quartile": 0.9}, False),
+    ("C22", TIMED | {"lower quartile": 0.2, "upper quartile": 0.9}, True),
+    ("C22", TIMED | {"lower quartile": 0.2, "upper quartile": 0.92}, None),
+    ("C22", TIMED | {"lower quartile": 1.11, "upper quartile": 4.0}, False),
+    ("C22", TIMED | {"lower quartile": 0.2, "upper quartile": 0.9, "apart": 1e-3}, None),
+    ("C22", {"solver alone": 9.0, "IAPB, slowest": 8.0, "IAPB": 2.0, "time": 99.0}, True),
+    ("C22", {"solver alone": 8.5, "IAPB, slowest": 8.0, "IAPB": 2.0, "time": 99.0}, None),
+    ("C22", {"solver alone": 0.5, "IAPB, slowest": 8.0, "IAPB": 2.0, "time": 1.0}, False),
 ]
 
 

@@ -12,8 +12,18 @@ from iapb import find_scene, load_scene
 from iapb.scene import Scene, SpatialScene, scene_names
 from reference.worlds import find_world
 from tests.iapb.contact.paper import scene_of
-from verification.clock import Times
-from verification.cost.effects import NOTHING, SWITCHED, Loop, effects_of, saved
+from verification.cost.effects import (
+    MOVES,
+    SAME,
+    SWITCHED,
+    Loop,
+    effects_of,
+    matrix,
+    numbers_of,
+    step_of,
+    steps_table,
+)
+from verification.table import table_from
 
 
 def _scene(name: str, duration: float) -> Scene:
@@ -23,9 +33,7 @@ def _scene(name: str, duration: float) -> Scene:
 def _measured(scene: Scene) -> dict[str, dict[str, Any]]:
     """What was measured, by effect."""
     return {
-        row["effect"]: row
-        for row in effects_of(scene, rounds=1).records()
-        if row["position"] is not None
+        row["effect"]: row for row in effects_of(scene).records() if row["position"] is not None
     }
 
 
@@ -41,14 +49,6 @@ def test_without_walls_or_hand_the_peg_goes_elsewhere() -> None:
     assert found["hand_force"]["energy"] == pytest.approx(100.0)
     assert found["clustering"]["position"] == 0.0
     assert found["impulses"]["position"] > 0.1
-
-
-def test_what_the_rounds_do_not_agree_on_is_noise() -> None:
-    assert saved(Times((0.7, 0.9, 0.9, 0.8, 1.3))) == pytest.approx(
-        10.0
-    )  # one round may be disturbed
-    assert saved(Times((0.7, 0.9, 1.1, 1.2, 0.8))) is None and saved(Times((1.0,))) is None
-    assert saved(Times((1.3, 1.2, 1.25))) == pytest.approx(-25.0)
 
 
 @pytest.mark.parametrize("name", scene_names())
@@ -91,7 +91,29 @@ def test_a_wall_that_is_never_reached_changes_nothing() -> None:
     wall = {"name": "wall", "kind": "half_plane", "point": [0.2, 0], "normal": [-1, 0]}
     contact = {"friction": 0.5, "stiffness": 1e3, "damping": 1}
     scene = scene_of([cart], [wall], rate=500.0, duration=0.2, contact=contact)
-    found = {row["effect"]: row for row in effects_of(scene, rounds=1).records()}
-    for name in ("friction", "impulses", "penalty_stiffness", "contact_damping"):
-        assert found[name]["active"] and found[name]["change"] == f"{NOTHING}: nothing touches"
-    assert found["wall_contacts"]["change"] == f"{NOTHING}: no body touches a wall"
+    found = {row["effect"]: row for row in effects_of(scene).records()}
+    for name in ("friction", "impulses", "penalty_stiffness", "contact_damping", "wall_contacts"):
+        assert found[name]["active"] and found[name]["without it"] == SAME
+    assert found["wall_contacts"]["position"] == 0.0
+
+
+def test_the_time_saved_is_measured_on_one_motion_beside_its_noise() -> None:
+    row = step_of(_scene("peg_corner", 0.2), rounds=3)
+    assert row["saved, lower [%]"] <= row["saved [%]"] <= row["saved, upper [%]"]
+    assert row["noise [%]"] >= 0.0 and row["clear"] == (row["saved, lower [%]"] > row["noise [%]"])
+    assert row["apart with all on [mm]"] == 0.0
+    numbers = numbers_of(steps_table([row]))
+    assert (numbers["scenes"], numbers["effects_on"]) == (1, row["effects on"])
+    assert numbers["alone"] and numbers["saved_median"] == pytest.approx(0.01 * row["saved [%]"])
+
+
+def test_a_matrix_has_a_column_for_each_effect_that_some_scene_needs() -> None:
+    keys = ("effect", "active", "without it")
+    rows = [("gravity", True, MOVES), ("friction", False, None), ("touch", True, SAME)]
+    one, two = (
+        table_from(dict(zip(keys, row, strict=True)) for row in given)
+        for given in (rows, [("gravity", False, None), *rows[1:]])
+    )
+    table = matrix({"one": one, "two": two})
+    assert table.keys == ["scene", "gravity", "touch"]
+    assert table.rows == (("one", "on", "idle"), ("two", "off", "idle"))

@@ -9,12 +9,11 @@ import pytest
 from iapb.system import System
 from reference.mujoco import joint_places, set_state
 from verification.check import Study
-from verification.cost import growth, steps
-from verification.cost.accuracy import BUDGET_ROWS, Stopped
+from verification.cost import growth, impact_times, steps
+from verification.cost.accuracy import BUDGET_ROWS, COMPILED, LEMKE, PYTHON, Stopped
 from verification.cost.calls import PRINTED
 from verification.cost.resting import RESTING
 from verification.cost.steps import OwnLoop
-from verification.finding import NOT_COMPUTED
 from verification.table import table_from
 
 
@@ -56,12 +55,6 @@ def test_a_race_states_contacts_of_both_and_keeps_every_solver() -> None:
     ) < 1e-6
 
 
-def test_without_mujoco_the_race_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(steps, "find_spec", lambda name: None)
-    [part] = steps.RACES.sentences(steps.RACES.table(Study()))
-    assert part.verdict == NOT_COMPUTED and "MuJoCo is not installed" in part.sentence
-
-
 def test_pairs_tested_grow_linearly_where_all_pairs_grow_quadratically() -> None:
     """All pairs give 2 in the limit; the density of the field, and with it the neighbours of a
     disc, changes a little."""
@@ -71,44 +64,19 @@ def test_pairs_tested_grow_linearly_where_all_pairs_grow_quadratically() -> None
 
 
 def test_the_most_contacts_are_the_last_in_time() -> None:
-    keys = ("method", "deadline", "coordinates", "contacts", "late calls")
+    keys = ("method", "deadline", "coordinates", "contacts", "late calls", "time")
+    ours, theirs = growth.TITLES.values()
     rows = [
-        ("a", growth.MILLISECOND, 3, contacts, late)
+        (ours, growth.MILLISECOND, 3, contacts, late, 2.0 * contacts)
         for contacts, late in ((6, 0), (12, growth.ALLOWED), (30, growth.ALLOWED + 1))
     ]
-    rows += [("a", growth.PAPER_STEP, 3, 30, 0), ("b", growth.MILLISECOND, 3, 6, 9)]
+    rows += [(ours, growth.PAPER_STEP, 3, 30, 0, 60.0), (theirs, growth.MILLISECOND, 3, 6, 9, 1.0)]
     trials = table_from(dict(zip(keys, row, strict=True)) for row in rows)
-    assert growth.most_contacts(trials) == {"a": {3: 12}, "b": {3: 0}}
-
-
-def test_exponents_and_the_steepest_range_are_those_of_the_method_and_the_axis() -> None:
-    power = {
-        growth.FACTORED: (1.0, 2.0),
-        PRINTED: (0.5, 3.0),
-    }  # over contacts and coordinates, above the smallest size
-    sizes = [(12, c) for c in (30, 60, 120)] + [(d, 60) for d in (6, 24)]
-    table = table_from(
-        {
-            "method": method,
-            "coordinates": d,
-            "contacts": c,
-            "time [µs]": (max(c, 60) / 60) ** a * (d / 12) ** b,
-        }
-        for method, (a, b) in power.items()
-        for d, c in sizes
-    )
-    for method, (over_contacts, over_coordinates) in power.items():
-        row = growth.fitted(table, method, "contacts")
-        assert (row["steepest from"], row["to"], row["there"]) == (
-            60,
-            120,
-            pytest.approx(over_contacts),
-        )
-        row = growth.fitted(table, method, "coordinates")
-        assert (row["exponent"], row["there"]) == (
-            pytest.approx(over_coordinates),
-            pytest.approx(over_coordinates),
-        )
+    assert growth.most_contacts(trials, growth.FACTORED, 3) == 12
+    assert growth.most_contacts(trials, PRINTED, 3) == 0
+    over = growth.times_over(trials, growth.FACTORED, "contacts", coordinates=3)
+    assert over == [(6, 12.0), (12, 24.0), (30, 60.0)]
+    assert growth.power_law(*zip(*over, strict=True)) == pytest.approx(1.0)
 
 
 def test_every_budget_is_passive_and_the_whole_one_meets_restitution() -> None:
@@ -123,12 +91,30 @@ def test_every_budget_is_passive_and_the_whole_one_meets_restitution() -> None:
     assert none == 0.0 < few < every == pytest.approx(1.0)
 
 
-def test_sizes_are_timed_by_both_methods() -> None:
-    """Times themselves are never judged by a test: that is for `iapb bench`."""
-    found = growth.scaling(Study(), ((3, 4), (12, 600)))
-    timed = [(row["method"], row["contacts"]) for row in found]
-    assert timed == [(growth.FACTORED, 4), (PRINTED, 4), (growth.FACTORED, 600)]
-    assert all(0.0 < row["lower quartile [µs]"] <= row["upper quartile [µs]"] for row in found)
-    assert {(12, contacts) for contacts in growth.FACTORS} <= set(
-        growth.SIZES
-    )  # the printed formula has targets there
+def test_a_size_that_is_late_ends_a_method_but_not_below_the_sizes_with_targets(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(growth, "call_times", lambda *_: ([1.0, 1.0], 0.5))
+    trials = list(growth.haptic_rate(12, PRINTED))
+    assert [row["contacts"] for row in trials[::2]] == [6, 12, 30, 60, 120, 300]
+    assert {row["late calls [of 1000]"] for row in trials} == {2}
+    assert {row["time [µs]"] for row in trials} == {5e5}
+    assert set(growth.FACTORS) <= set(growth.CONTACTS)
+
+
+@pytest.mark.thorough
+def test_a_rigid_step_is_judged_by_the_time_inside_its_compiled_solver() -> None:
+    [row] = impact_times.compare(Study(), "peg_corner")
+    assert 0.0 < row["solver alone [µs]"] < row["time [µs]"] and row["IAPB [µs]"] < row["time [µs]"]
+    assert row["IAPB, slowest [µs]"] >= row["IAPB [µs]"]
+
+
+@pytest.mark.parametrize("called", [COMPILED, PYTHON])
+def test_methods_that_are_called_in_one_way_are_timed_on_the_same_impact(called: str) -> None:
+    rows = list(impact_times.compare(Study(), impact_times.Size("patch", called, 4)))
+    names = {row["method"] for row in rows}
+    assert names == (
+        {LEMKE} if called == COMPILED else {PRINTED, impact_times.DAQP, *impact_times.SOLVERS}
+    )
+    assert all(row["apart"] < impact_times.SOLVED for row in rows)
+    assert all(row["lower quartile"] <= row["ratio"] <= row["upper quartile"] for row in rows)

@@ -135,16 +135,11 @@ def test_the_choice_is_in_time_makes_no_energy_and_is_as_exact_as_can_be() -> No
     assert "nearest is Gauss-Seidel, stopped after 4 sweeps" in str(nearest)
 
 
-def test_a_cell_names_no_method_that_solves_less_than_half() -> None:
-    """A row of IAPB with an error of 1 was named as the method to take."""
-    table = study.choices(KNOWN)
-    assert table.column("method") == ["none", *["Lemke"] * 4]
-    assert table.column("nearest") == ["Gauss-Seidel, 4 sweeps: 0.1", *[None] * 4]
-    assert all(
-        row["share solved"] >= 50.0 and row["error"] <= study.SOLVED
-        for row in table.records()
-        if row["time"]
-    )
+def test_the_method_of_a_size_is_the_fastest_exact_one_of_its_kind() -> None:
+    [row] = study.recommended(KNOWN).records()
+    assert (row["method, compiled"], row["method, from Python"]) == ("Lemke", None)
+    numbers = study.numbers_of(study.recommended(KNOWN))
+    assert (numbers["sizes"], numbers["sizes_iapb"]) == (1, 0)
 
 
 def chosen_from(ways: dict[str, list[tuple[float, ...]]]) -> study.Choice:
@@ -166,23 +161,6 @@ def test_impacts_without_an_answer_in_time_are_not_solved() -> None:
         assert choice.time == pytest.approx(2e-6) and ": 2 µs an impact" in str(choice)
     nearest = chosen_from({"few, all": [good, late, late, late], "many, all": [bad, bad, bad, bad]})
     assert nearest.method == "many" and not nearest.enough
-
-
-def test_a_rival_wins_an_impact_only_where_it_is_faster_and_as_exact() -> None:
-    lost = study.lost_to_rivals(
-        rows_of(
-            {
-                "IAPB, all rows": [(3.0, 1e-15), (9.0, 1e-3)],
-                "IAPB, 1 row": [(1.0, 1e-15), (1.0, 1e-15)],
-                "Lemke, all pivots": [(4.0, 1e-15), (6.0, 1e-3)],
-                "Gauss-Seidel, 4 sweeps": [(2.0, 1e-5), (3.0, 5e-4)],
-            }
-        )
-    )
-    assert lost.select(("problem", "solver", "time", "IAPB", "ratio")).rows == (
-        ("1", "Lemke", 6.0, 9.0, 1.5),
-        ("1", "Gauss-Seidel", 3.0, 9.0, 3.0),
-    )
 
 
 def test_a_solver_that_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
