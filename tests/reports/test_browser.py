@@ -1,8 +1,8 @@
 """The report of made-up records as a reader meets it in a browser that is cut off from everything
 but its pages.
 
-Wide and narrow, light and dark, by keyboard, on paper, without script; curves, films, and the poses
-that films show. Without a browser the tests are skipped, and say so.
+Wide and narrow, light and dark, by keyboard, on paper, without script; curves.
+Without a browser the tests are skipped, and say so.
 """
 
 import shutil
