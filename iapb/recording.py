@@ -14,7 +14,6 @@ from iapb.advice.distrust import distrust_of
 from iapb.haptics.rendering import PLANNED
 from iapb.loop import LINES, STATES, make_record
 from iapb.mechanics.energy import FORCES, energy_of_run, last_of
-from iapb.mechanics.mechanism import Mechanism
 from iapb.numerics.schema import Floats
 from iapb.run import UNSOLVED, ContactTable, EffectRow, ImpactTable, Later, Run, digests
 from iapb.scene.model import SpatialScene
@@ -186,7 +185,7 @@ class Recorder:
             time=np.arange(self.first, self.steps + 1, dtype=np.float64) * system.dt,
             **steps,
             contacts=ContactTable(offsets, **self.joined("contacts")),
-            impacts=ImpactTable(**impacts, mass_digest=_mass_digests(mechanism, impacts["q"])),
+            impacts=ImpactTable(**impacts, mass_digest=_mass_digests(system, impacts["q"])),
             effects=tuple(
                 EffectRow(one.name, one.active, one.reason, one.ignores)
                 for one in simulation.effects
@@ -213,15 +212,16 @@ class Recorder:
         )
 
 
-def _mass_digests(mechanism: Mechanism, places: Floats) -> NDArray[np.int64]:
+def _mass_digests(system: Any, places: Floats) -> NDArray[np.int64]:
     """Return the digest of M at each of n configurations (n, nq), a few at a time: all of them may
     take gigabytes."""
+    mechanism, start = system.mechanism, system.start[0]
     few = max(1, _BATCH // max(1, 8 * mechanism.nv**2))
     return np.concatenate(
         [
             np.zeros(0, np.int64),
             *(
-                digests(mechanism.mass_matrices(places[k : k + few]))
+                digests(mechanism.mass_matrices_of_run(start, places[k : k + few]))
                 for k in range(0, len(places), few)
             ),
         ]

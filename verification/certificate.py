@@ -25,7 +25,7 @@ from iapb.contact.laws import ENGINE_LAWS, ImpulseAugmented
 from iapb.errors import ArgumentError, IapbError
 from iapb.numerics.schema import Booleans, Floats, Integers
 from iapb.run import Run, digests
-from iapb.scene.mechanism import mechanism_of, pairs_of, restitutions_of, shapes_of
+from iapb.scene.mechanism import mechanism_of, pairs_of, restitutions_of, shapes_of, start_of
 from iapb.scene.reading import scene_from_values
 
 Batch = tuple[
@@ -344,10 +344,11 @@ def _total(run: Any) -> float:
 def _batches(run: Any) -> Iterator[Batch]:
     """Yield M, v⁻, v⁺ and the generalized impulse of the recorded impacts in batches of
     `_BATCH`."""
-    table, mechanism = run.impacts, mechanism_of(scene_from_values(run.scene_resolved))
+    scene = scene_from_values(run.scene_resolved)
+    table, mechanism, begin = run.impacts, mechanism_of(scene), start_of(scene)[0]
     for start in range(0, len(table.step), _BATCH):
         chosen = slice(start, start + _BATCH)
-        masses = mechanism.mass_matrices(table.q[chosen])
+        masses = mechanism.mass_matrices_of_run(begin, table.q[chosen])
         other = np.flatnonzero(digests(masses) != table.mass_digest[chosen])
         if len(other):
             raise IapbError(

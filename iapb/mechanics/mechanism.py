@@ -207,6 +207,16 @@ class Mechanism:
             self._check_states(places)
         return out
 
+    def mass_matrices_of_run(self, start: ArrayLike, qs: ArrayLike) -> Floats:
+        """Return M (n, d, d) that a run from `start` (nq,) has at each of its configurations qs.
+
+        The engine computes a constant M once. At another configuration it may differ in the last
+        bit, which an exact judgement would see.
+        """
+        if self.has_constant_mass_matrix:
+            return np.repeat(self.mass_matrix(start)[None], len(np.asarray(qs)), axis=0)
+        return self.mass_matrices(qs)
+
     def unmoved_velocity(self, q: ArrayLike) -> int | None:
         """Return the first velocity that moves no mass of its own, so that M(q) is not positive
         definite; None: M is."""

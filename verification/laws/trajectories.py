@@ -89,7 +89,9 @@ class Trajectory:
     @cached_property
     def struck_masses(self) -> Floats:
         """M at each impact, (k, d, d)."""
-        return np.asarray(self.system.mechanism.mass_matrices(self.run.impacts.q))
+        return np.asarray(
+            self.system.mechanism.mass_matrices_of_run(self.system.start[0], self.run.impacts.q)
+        )
 
     @cached_property
     def cut(self) -> NDArray[np.bool_]:
