@@ -184,11 +184,21 @@ def main(arguments: list[str] | None = None) -> int:
     return status
 
 
+def _named(given: list[str]) -> list[str]:
+    """Return `verify --full` and `verify --world NAME` with the names of the commands that they
+    mean."""
+    for option, command in (("--full", "verify-many"), ("--world", "verify-world")):
+        if given[:1] == ["verify"] and option in given:
+            return [command, *(word for word in given[1:] if word != option)]
+    return given
+
+
 def _status(given: list[str]) -> int:
     """Run the command line and return its status. A usage error of typer's is known by its
     attributes, since typer has its own copy of click or the installed one; any other unnamed error
     is a bug and raised."""
     explained = False
+    given = _named(given)
     try:
         _refuse_empty(given)
         return _app(given)(args=given, prog_name="iapb", standalone_mode=False) or 0

@@ -154,6 +154,6 @@ def _archived(path: Path) -> dict[str, np.ndarray]:
     missing = [name for name in _GIVEN if name not in arrays]
     if missing:
         raise RunFileError(
-            f"{path}: {', '.join(missing)} missing; docs/report.md states the format"
+            f"{path}: {', '.join(missing)} missing; docs/certificate.md states the format"
         )
     return arrays

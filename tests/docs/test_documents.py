@@ -34,7 +34,15 @@ DOCUMENTS = (
     "README.md",
     *(
         pytest.param(f"docs/{name}.md", marks=pytest.mark.thorough)
-        for name in ("tutorial", "scenes", "resolvers", "haptic_loop", "questions")
+        for name in (
+            "tutorial",
+            "scenes",
+            "resolvers",
+            "certificate",
+            "haptic_loop",
+            "report",
+            "questions",
+        )
     ),
 )
 WIDTH = "100"  # of the terminal that the documents show

@@ -104,7 +104,7 @@ def archive(path, gain=False):
 def listed(command):
     """The keys that the documents list for a command: the words before what stands in brackets."""
     [row] = re.findall(
-        rf"^\| `{command}` \| (.*) \|$", (ROOT / "docs" / "report.md").read_text("utf-8"), re.M
+        rf"^\| `{command}` \| (.*) \|$", (ROOT / "docs" / "commands.md").read_text("utf-8"), re.M
     )
     return {key.strip() for key in re.sub(r"\([^)]*\)|;.*", "", row).split(",")}
 
@@ -669,3 +669,9 @@ def test_on_a_terminal_there_are_bars_unless_it_is_a_dumb_one(monkeypatch, capsy
     assert ("\x1b[" in err) == (term == "xterm") and ("a stage [of work] ..." in err) == (
         term == "dumb"
     )
+
+
+def test_options_of_verify_name_the_commands_that_they_mean():
+    assert cli._named(["verify", "--full", "--seed", "3"]) == ["verify-many", "--seed", "3"]
+    assert cli._named(["verify", "--world", "mujoco"]) == ["verify-world", "mujoco"]
+    assert cli._named(["run", "--world", "IAPB"]) == ["run", "--world", "IAPB"]

@@ -18,7 +18,7 @@ from verification.numbers import read_values
 from verification.proofs import all_proofs, on_proofs
 from verification.proofs.coq import checked
 
-IMPACTS = 1_500  # a hundred thousand were judged alike once: see docs/report.md
+IMPACTS = 1_500  # a hundred thousand were judged alike once: see docs/certificate.md
 needs_coq = pytest.mark.skipif(shutil.which("coqc") is None, reason="coqc is not installed")
 needs_ocaml = pytest.mark.skipif(
     shutil.which("coqc") is None or shutil.which("ocamlopt") is None,
