@@ -276,7 +276,7 @@ def test_json_has_the_keys_that_the_documents_list_and_an_error_is_an_object_too
     assert len(found["sweep"]["points"]) == 2 == found["sweep"]["new"]
     assert (Path(found["sweep"]["folder"]) / "points.nc").is_file()
     rows = {row[0]: row for row in found["solvers"]["tables"]["given"]["rows"]}
-    assert set(found["solvers"]["tables"]) == {"given", "profile"} and "not read" in rows["bad.lcp"]
+    assert set(found["solvers"]["tables"]) == {"given"} and "not read" in rows["bad.lcp"]
     assert (
         rows["two.lcp"].count("solved") > 3 and "solved" not in rows["none.lcp"]
     )  # no z has 0 <= z and -z - 1 >= 0
