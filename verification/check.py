@@ -7,8 +7,7 @@ outcomes of the rows.
 
     Check.finding(study)          a claim: each part is judged, a region is searched where a part
                                   is mixed
-    Topic(run, depth, progress)   a section of the report: each check gives a table and its
-                                  sentences
+    Topic(run, depth, progress)   a topic of the report: each check gives a table and its parts
 """
 
 from __future__ import annotations
@@ -32,6 +31,7 @@ from verification.finding import (
     Part,
     attempt,
     check_depth,
+    counts_of,
     finding_of,
     judge_part,
     of_each,
@@ -44,7 +44,6 @@ from verification.table import HOLDS, Row, Table, by_part, table_from
 
 Case = TypeVar("Case")
 Result = TypeVar("Result")
-Said = str | Part | Iterable[Part]
 
 SEED = 20050601  # of random impacts and conditions: the month in which the paper appeared
 
@@ -108,11 +107,7 @@ class Check:
     holds : one row -> True, False, or None if the row cannot decide; a pure function of the row,
         whose keys here lack the unit. Without it a row may have the key "holds"; without either,
         nothing is judged
-    says : judged table -> the result in words with numbers. A topic may also return one or more
-        Parts; a Part with an empty verdict gets that of the table. By default the question with the
-        number of rows that hold
     targets : table -> a `Part.on` for each number of a topic that has a target; each decides alone
-    spans : keys of the columns whose smallest and largest value the default sentence gives
     conditions, parts, counts, timed, prose : keys of the columns that are conditions, that split
         the rows into parts, that count the cases of a row, that depend on measured times, and that
         are sentences (see `Column`)
@@ -134,9 +129,7 @@ class Check:
     cases: Callable[[Study], Iterable[Any]]
     row: Callable[[Study, Any], Row | Iterable[Row]]
     holds: Callable[[Row], bool | None] | None = None
-    says: Callable[[Table], Said] | None = None
     targets: Callable[[Table], Iterable[Part]] | None = None
-    spans: Collection[str] = ()
     conditions: Collection[str] = ()
     parts: Collection[str] = ()
     counts: Collection[str] = ()
@@ -220,37 +213,17 @@ class Check:
 
         return drawn
 
-    def sentences(self, table: Table) -> tuple[Part, ...]:
-        """Return what a topic says of the judged table; nothing if the table is neither judged nor
-        told."""
+    def judge(self, table: Table) -> tuple[Part, ...]:
+        """Return the parts of a topic: its targets, or one part on all rows; none if nothing is
+        judged."""
         if self.targets is not None:
             return tuple(self.targets(table))
-        if self.says is None:
-            if self.holds is None and not table.holds:
-                return ()
-            told = table.only(held is not None for held in table.holds)
-            more = len(table.rows) - len(told.rows)
-            held = (
-                f"{sum(told.decided)} of {len(told.rows)} rows of the table hold"
-                f"{f'; {more} more cannot tell' * bool(more)}.{_spans(told, self.spans)}"
-            )
-            said: Said = Part(
-                f"{self.question} {held}",
-                "",
-                timed=any(column.timed for column in table.columns),
-                asked=self.question,
-                measured=held,
-                target="every row",
-            )
-        else:
-            said = self.says(table)
-        if isinstance(said, str):
-            said = Part(said, "", timed=any(column.timed for column in table.columns))
-        given = (said,) if isinstance(said, Part) else tuple(said)
-        return tuple(
-            part if part.verdict else replace(part, verdict=self.rule(table.holds))
-            for part in given
-        )
+        if not table.holds:
+            return ()
+        held, decided, unknown = counts_of(table)
+        timed = any(column.timed for column in table.columns)
+        verdict = self.rule(table.holds)
+        return (Part("", verdict, self.question, held, decided, unknown, timed=timed),)
 
 
 def proved(part: Part, statement: str) -> Part:
@@ -267,27 +240,11 @@ def _of_part(words: Mapping[str, str], name: str) -> str:
     return next((word for value, word in words.items() if f", {value}, " in f", {name}, "), "")
 
 
-def _spans(table: Table, keys: Iterable[str]) -> str:
-    """Return the smallest and largest value of each column in words, with its unit."""
-    titles = {column.key: column.title for column in table.columns}
-    found = {titles[key]: [value for value in table[key] if value is not None] for key in keys}
-    return "".join(
-        f" {key[:1].upper()}{key[1:]}: {_short(min(values))} to {_short(max(values))}."
-        for key, values in found.items()
-        if values
-    )
-
-
-def _short(value: float) -> str:
-    return f"{value:,}" if isinstance(value, int) else f"{value:.3g}"
-
-
 @dataclass(frozen=True, kw_only=True)
 class Topic:
     """A section of the report: a question and the checks that answer it.
 
     key, title, question : as in `Finding`; checks : one table each, in the order of the report
-    says : (tables by key of the check, all parts) -> the answer on the first page
     numbers, times : (tables by key of the check) -> the numbers that pages quote by key, and those
         that depend on measured times; see `verification.numbers`
     """
@@ -296,7 +253,6 @@ class Topic:
     title: str
     question: str
     checks: tuple[Check, ...]
-    says: Callable[[Mapping[str, Table], Sequence[Part]], str] | None = None
     numbers: Callable[[Mapping[str, Table]], Values] | None = None
     times: Callable[[Mapping[str, Table]], Values] | None = None
 
@@ -353,19 +309,16 @@ class Topic:
         lost, parts = list[Failure](), list[Part]()
         for check in self.checks:
             if check.key in tables:
-                said = partial(check.sentences, tables[check.key])
-                parts += attempt(f"{check.key}, its sentence", said, lost) or ()
+                judge = partial(check.judge, tables[check.key])
+                parts += attempt(f"{check.key}, its parts", judge, lost) or ()
         parts += given
-        answer = ""
-        if self.says is not None:
-            answer = attempt("the answer", partial(self.says, tables, parts), lost) or ""
         quoted = attempt("the numbers", partial(self._quoted, tables), lost) or {}
         known = {one.case for one in failures}
         return finding_of(
             self.key,
             self.title,
             self.question,
-            answer,
+            "",
             parts,
             {**tables, **quoted},
             [*failures, *(one for one in lost if one.case not in known)],

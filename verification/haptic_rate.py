@@ -149,7 +149,7 @@ def no_targets(_: Table) -> Sequence[Part]:
 
 def quoted(tables: Mapping[str, Table]) -> Values:
     """Return the numbers that the page on speed quotes; all of them depend on times."""
-    parts = [part for check in BENCH.checks for part in check.sentences(tables[check.key])]
+    parts = [part for check in BENCH.checks for part in check.judge(tables[check.key])]
     ours, stiff = (tables[WORTH.key].where(method=name).records()[0] for name in OURS)
     scenes = list(aims(tables[MOTIONS.key]))
     behind = [row["scene"] for row in scenes if row["error"] > 1.0]

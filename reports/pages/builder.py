@@ -235,7 +235,7 @@ def judged(part: Part) -> str:
     """Return the verdict on a part in words: whether its target is met, if it has one."""
     met = (
         {finding.REPRODUCED: "met", finding.MIXED: "in part", finding.REFUTED: "missed"}
-        if part.target
+        if part.limit is not None
         else FINDINGS
     )
     return (

@@ -8,7 +8,6 @@ from verification.check import Check, Study, Topic
 from verification.finding import (
     MIXED,
     NOT_COMPUTED,
-    NOT_TESTABLE,
     REFUTED,
     REPRODUCED,
     Part,
@@ -27,9 +26,9 @@ def a_check(key="sizes", cases=("a", "bb", "broken"), **options):
     return Check(key=key, cases=lambda study: cases, row=row, **options)
 
 
-def concluded(*checks, says=lambda tables, parts: "All said."):
+def concluded(*checks, numbers=None):
     progress = []
-    topic = Topic(key="topic", title="Topic", question="?", checks=checks, says=says)
+    topic = Topic(key="topic", title="Topic", question="?", checks=checks, numbers=numbers)
     found = topic(lambda *_: None, "quick", lambda *done: progress.append(done))
     assert progress == [(done, len(checks)) for done in range(len(checks) + 1)]
     return found
@@ -41,30 +40,29 @@ def test_a_case_that_raises_costs_its_row_alone():
     assert [(one.case, one.error) for one in found.failures] == [
         ("sizes, broken", "ZeroDivisionError")
     ]
-    assert (found.parts[0].sentence, found.parts[0].verdict) == (
-        "Cases are short. 2 of 2 rows of the table hold.",
+    part = found.parts[0]
+    assert (part.name, part.verdict, part.held, part.decided) == (
+        "Cases are short.",
         REPRODUCED,
+        2,
+        2,
     )
-    assert found.answer == "All said. 1 case failed."
 
 
-def test_a_sentence_or_a_check_that_raises_costs_itself_alone():
+def test_a_target_a_check_or_the_numbers_that_raise_cost_themselves_alone():
     found = concluded(
-        a_check(cases=("a",), says=lambda table: table.nothing),
+        a_check(cases=("a",), targets=lambda table: table.nothing),
         a_check("second", cases=None),
         a_check("third", cases=("ccc",)),
-        says=lambda tables, parts: tables["second"],
+        numbers=lambda tables: tables["second"],
     )
     assert [one.case for one in found.failures] == [
         "second, all of it",
-        "sizes, its sentence",
-        "the answer",
+        "sizes, its parts",
+        "the numbers",
     ]
     assert {"sizes", "third"} <= set(found.tables) and "second" not in found.tables
-    assert [part.verdict for part in found.parts] == [
-        REFUTED,
-        NOT_COMPUTED,
-    ] and found.answer == "3 cases failed."
+    assert [part.verdict for part in found.parts] == [REFUTED, NOT_COMPUTED]
 
 
 def test_a_table_made_before_is_not_made_again():
@@ -78,7 +76,6 @@ def test_a_table_made_before_is_not_made_again():
         title="Topic",
         question="?",
         checks=checks,
-        says=lambda tables, parts: "All said.",
     )
     given = lambda *_: None  # noqa: E731
     known = topic.measure(checks[1:], given, "quick", given, [])
@@ -109,27 +106,23 @@ def test_a_row_may_have_its_own_outcome():
     assert table.holds == (True, None) and table.keys == ["case"]
     assert (
         check.table_of([{"case": "a"}]).holds == ()
-        and check.sentences(check.table_of([{"case": "a"}])) == ()
+        and check.judge(check.table_of([{"case": "a"}])) == ()
     )
 
 
 @pytest.mark.parametrize(("rule", "verdict"), [(None, REFUTED), (verdict_of_trials, MIXED)])
-def test_the_verdict_of_a_sentence_follows_from_the_rows(rule, verdict):
-    check = a_check(says=lambda table: "Said.", **({"rule": rule} if rule else {}))
-    (said,) = check.sentences(
+def test_the_verdict_of_a_check_follows_from_the_rows(rule, verdict):
+    check = a_check(**({"rule": rule} if rule else {}))
+    (part,) = check.judge(
         check.table_of([{"case": "a", "size [m]": 1}, {"case": "cccc", "size [m]": 4}])
     )
-    assert said.verdict == verdict and not said.timed
-    assert check.sentences(check.table_of([]))[0].verdict == NOT_TESTABLE
+    assert part.verdict == verdict and not part.timed
 
 
-def test_a_check_may_say_more_than_one_part():
-    parts = [Part("First.", "", "one"), Part("2 of 2 hold.", REPRODUCED)]
-    found = concluded(a_check(cases=("a",), says=lambda table: parts))
-    assert [(part.name, part.verdict) for part in found.parts] == [
-        ("one", REPRODUCED),
-        ("", REPRODUCED),
-    ]
+def test_a_missed_target_of_a_check_refutes_its_topic():
+    targets = lambda table: [Part.on("longest", max(table["size"]), 1)]  # noqa: E731
+    assert concluded(a_check(cases=("a",), targets=targets)).verdict == REPRODUCED
+    assert concluded(a_check(cases=("a", "bb"), targets=targets)).verdict == REFUTED
 
 
 def test_several_rows_of_a_case_and_shared_results():

@@ -71,10 +71,10 @@ def test_the_map_counts_all_cases_and_one_exception_refutes_it() -> None:
     assert len(FOUND) == 6 * 3 * sum(len(redundancies) for _, redundancies in FAMILIES.values())
     row = study.map_row("one contact", FOUND)
     assert row["cases"] == len(FOUND) == row["agree"] + row["differ"]
-    (told,) = study.MAP.sentences(study.MAP.table_of([row]))
+    (told,) = study.MAP.judge(study.MAP.table_of([row]))
     assert told.verdict == REPRODUCED
     wrong = study.MAP.table_of([row, row | {"contradictions": 1}])
-    assert study.MAP.sentences(wrong)[0].verdict == REFUTED
+    assert study.MAP.judge(wrong)[0].verdict == REFUTED
     for key in ("defect", "momentum outside range(Jᵀ)"):
         assert study.MAP.table_of([row | {key: 1e-3}]).passed is False
 
@@ -100,9 +100,9 @@ def test_piles_agree_only_where_they_are_small_and_pushing_is_the_lcp() -> None:
     assert small["piles"] == 48 and large["piles"] == 12
     assert small["agree"] > 0 == large["agree"]
     assert large["share of impulses that pull"] > 0.0
-    assert PILES.sentences(table)[0].verdict == REPRODUCED
+    assert PILES.judge(table)[0].verdict == REPRODUCED
     wrong = PILES.table_of([table.by_title()[0] | {"pushing only, from the LCP": 1e-3}])
-    assert PILES.sentences(wrong)[0].verdict == REFUTED
+    assert PILES.judge(wrong)[0].verdict == REFUTED
 
 
 def test_a_bar_on_two_posts_pushes_and_pulls_as_the_condition_says() -> None:

@@ -32,7 +32,7 @@ def test_friction_is_coulombs_law_where_all_push_and_never_gains(
     assert all(row["NCP gains"] == 0 for row in plastic)
     assert any(row["NCP gains"] > 0 and row["friction reduced"] > 0 for row in elastic)
     for wrong in ({"share equal to the NCP": -1}, {"largest change of KE, IAPB": 1e-9}):
-        said = FRICTION.sentences(FRICTION.table_of([plastic[0] | wrong]))
+        said = FRICTION.judge(FRICTION.table_of([plastic[0] | wrong]))
         assert [part.verdict for part in said].count(REFUTED) == 1
 
 
@@ -103,7 +103,7 @@ def test_a_folder_of_problems(tmp_path: Path) -> None:
     )
     assert skew["asymmetry of W"] > 0.1 and (skew["daqp"], skew["lemke"]) == ("refused", "solved")
     assert damaged["daqp"] == "not read" and "size 3 with 2 numbers" in damaged["why not read"]
-    assert check.sentences(table)[0].verdict == REFUTED and table.holds == (True, True, False)
+    assert check.judge(table)[0].verdict == REFUTED and table.holds == (True, True, False)
 
 
 def test_a_slow_solver_is_not_asked_for_more_and_a_problem_without_solution_fails() -> None:

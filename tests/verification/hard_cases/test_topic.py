@@ -54,11 +54,11 @@ def test_a_failing_case_is_a_missed_target_and_so_is_a_wrong_scene(
     tables: Mapping[str, Table],
 ) -> None:
     every = tables[EVERY_METHOD.key]
-    assert EVERY_METHOD.sentences(every)[0].verdict == REFUTED
+    assert EVERY_METHOD.judge(every)[0].verdict == REFUTED
     right = every.only(not case.startswith("Wall") for case in every["case"])
-    assert EVERY_METHOD.sentences(right)[0].verdict == REPRODUCED
+    assert EVERY_METHOD.judge(right)[0].verdict == REPRODUCED
     for check, planted in ((ORDINARY, "IAPB is right"), (TOUCH, "error, impacts at the touch")):
         table = tables[check.key]
-        assert check.sentences(table)[0].verdict == REPRODUCED
+        assert check.judge(table)[0].verdict == REPRODUCED
         wrong = [row | {planted: planted.startswith("error") and 9.0} for row in table.by_title()]
-        assert check.sentences(check.table_of(wrong))[0].verdict == REFUTED
+        assert check.judge(check.table_of(wrong))[0].verdict == REFUTED

@@ -101,5 +101,5 @@ def test_a_family_whose_impacts_do_not_move_is_not_reproduced(
         ([moved, still], NOT_TESTABLE),
         ([moved, still, gaining], REFUTED),
     ):
-        (part,) = TABLE.sentences(TABLE.table_of(rows))
+        (part,) = TABLE.judge(TABLE.table_of(rows))
         assert part.verdict == verdict

@@ -16,10 +16,10 @@ from verification.table import HOLDS
 
 def test_a_broken_law_and_a_fault_that_no_check_catches_are_missed_targets() -> None:
     row = {"law": "KE", "cases": 10, "worst": 0.0, "bound": 1.0, HOLDS: True, CAUGHT: True}
-    sound = LAW_TABLE.sentences(LAW_TABLE.table_of([row]))
+    sound = LAW_TABLE.judge(LAW_TABLE.table_of([row]))
     assert [part.verdict for part in sound] == [REPRODUCED] * 2
     for key in (HOLDS, CAUGHT):
-        wrong = LAW_TABLE.sentences(LAW_TABLE.table_of([row, row | {key: False}]))
+        wrong = LAW_TABLE.judge(LAW_TABLE.table_of([row, row | {key: False}]))
         assert sorted(part.verdict for part in wrong) == sorted([REPRODUCED, REFUTED])
 
 

@@ -51,7 +51,7 @@ def test_every_set_is_compared_and_agrees():
     assert {"peg_corner", "tumbling_body", "arm_obstacles"} <= set(of["scenes"])
     assert [name.split()[-1] for name in of["random trees"]] == list(map(str, study.TREE_SIZES))
     assert table.where(set=study.OTHERS).column("base") == ["fixed", "floating"]
-    assert {part.verdict for part in study.AGAINST_PINOCCHIO.sentences(table)} == {REPRODUCED}
+    assert {part.verdict for part in study.AGAINST_PINOCCHIO.judge(table)} == {REPRODUCED}
 
 
 def test_robots_that_are_not_there_are_left_out(monkeypatch, tmp_path):
@@ -71,7 +71,7 @@ def test_a_wrong_mass_is_noticed_in_every_tree(monkeypatch):
     chosen = [case for case in cases("joint kinds") if "revolute" in case.label]
     table = study.AGAINST_PINOCCHIO.table(Study(), chosen)
     assert set(table.holds) == {False} and REFUTED in {
-        part.verdict for part in study.AGAINST_PINOCCHIO.sentences(table)
+        part.verdict for part in study.AGAINST_PINOCCHIO.judge(table)
     }
 
 

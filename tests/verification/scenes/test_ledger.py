@@ -109,8 +109,8 @@ def test_a_scene_that_leaves_much_open_misses_its_target() -> None:
         "order measured": 1.0,
     }
     table = ledger.SCENES.table_of([row])
-    assert {part.verdict for part in ledger.SCENES.sentences(table)} == {REPRODUCED}
+    assert {part.verdict for part in ledger.SCENES.judge(table)} == {REPRODUCED}
     worse = {f"{books.OPEN} [%]": 2.0, "order measured": 0.2, ledger.DEEPEST: 0.9, "stopped": "why"}
     for key, value in worse.items():
-        wrong = ledger.SCENES.sentences(ledger.SCENES.table_of([row | {key: value}]))
+        wrong = ledger.SCENES.judge(ledger.SCENES.table_of([row | {key: value}]))
         assert [part.verdict for part in wrong].count(REFUTED) == 1
