@@ -217,11 +217,6 @@ def unstated(parts: Iterable[Part], shown: Sequence[str]) -> list[Part]:
     return [part for part in every if part not in seen]
 
 
-def ranked(found: Iterable[Any]) -> list[Any]:
-    """Return claims, topics or parts, the worst verdict first."""
-    return sorted(found, key=lambda one: finding.WORST_FIRST.index(one.verdict))
-
-
 def badge_words(topic: Finding) -> str:
     """Return the summary of a topic for the first page: how many of its findings fail."""
     failing, total = sum(part.verdict == finding.REFUTED for part in topic.parts), len(topic.parts)
@@ -271,7 +266,6 @@ def _environment() -> Environment:
         judged=judged,
         badge_words=badge_words,
         tables_without=tables_without,
-        ranked=ranked,
         stated=stated,
         unstated=unstated,
         title=lambda name: name[:1].upper() + name[1:],

@@ -1,4 +1,4 @@
-"""Extensions, timings, collections of problems, references: what their checks find, and that
+"""Extensions, collections of problems, references: what their checks find, and that
 planted rows turn it."""
 
 from __future__ import annotations
@@ -16,9 +16,6 @@ from verification.complementarity import extensions
 from verification.complementarity.extensions import FRICTION, UNEQUAL
 from verification.complementarity.of_runs import scene_impacts
 from verification.complementarity.solvers import SCENES, collections, study_read
-from verification.cost import solvers as timings
-from verification.cost.calls import PRINTED
-from verification.cost.solvers import DAQP, IAPB, IMPACT_TIMES, KERNEL, LEMKE_KERNEL, Size
 from verification.finding import REFUTED
 
 
@@ -48,42 +45,6 @@ def test_unequal_restitution_is_poissons_law_and_never_gains() -> None:
 @pytest.mark.parametrize("name", SCENES)
 def test_each_scene_of_our_own_problems_has_an_impact_without_friction(name: str) -> None:
     assert scene_impacts(name)
-
-
-def test_every_way_is_timed_on_every_size_and_gives_the_same_motion(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(timings, "SOLVERS", ("daqp", "lemke"))
-    sizes = [Size(family, contacts) for family in ("patch", "pile") for contacts in (1, 3)]
-    costs = IMPACT_TIMES.table(Study(), sizes)
-    assert set(costs.select(("impacts", "contacts", "solver")).rows) == {
-        (*size, solver)
-        for size in sizes
-        for solver in (KERNEL, IAPB, PRINTED, LEMKE_KERNEL, DAQP, "daqp", "lemke")
-    }
-    assert set(costs.column("outcome")) == {"solved"} and min(costs.column("samples")) >= 3
-    assert all(row["least"] <= row["median"] <= row["largest"] for row in costs.records())
-
-
-def test_a_wrong_answer_is_not_called_solved_and_a_slow_solver_is_left_out(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    original = timings.calls.solver_call
-
-    def wrong(case, name):  # type: ignore[no-untyped-def]
-        if name == "quadprog":
-            raise ZeroDivisionError("planted")
-        return (lambda: case.velocity) if name == "lemke" else original(case, name)
-
-    monkeypatch.setattr(timings.calls, "solver_call", wrong)
-    monkeypatch.setattr(timings, "SOLVERS", ("daqp", "lemke", "quadprog"))
-    monkeypatch.setitem(timings.LONGEST, "quick", 0.0)
-    study = Study(failures=[])
-    patch = IMPACT_TIMES.table(study, [Size("patch", 1), Size("patch", 2)])
-    assert patch.where(contacts=1, solver="lemke").column("outcome") == ["failed"]
-    assert patch.where(contacts=2, solver="daqp").column("outcome") == ["left out"]
-    assert patch.where(solver="quadprog").column("outcome") == ["failed", "failed"]
-    assert study.failures and study.failures[0].case == "quadprog on a patch of 1 contacts"
 
 
 def test_a_folder_of_problems(tmp_path: Path) -> None:
