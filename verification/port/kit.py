@@ -202,7 +202,7 @@ def check_force(
     chosen = FORCE_LAWS if laws is None else laws_named(FORCE_LAWS, laws)
     if not (callable(law) or hasattr(law, "step") or hasattr(law, "follow")):
         raise ArgumentError("law", law, "a function of (x, v), or an object with step(x, v)")
-    if getattr(law, "rate", device.rate) != device.rate:
+    if hasattr(law, "follow") and law.rate != device.rate:
         raise ArgumentError("rate", device.rate, f"{law.rate:g} Hz, the rate of the scene")
     at = start_of(start)
     port, terms = Port(law, device, len(at)), Terms(stored, limit)

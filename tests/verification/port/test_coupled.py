@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from iapb.errors import ArgumentError
 from iapb.simulation import Simulation
 from reference.worlds import find_world
 from verification.port import BareDevice, check_force
@@ -58,6 +59,15 @@ def test_the_fast_model_of_cbuc_gives_the_forces_of_the_engine(damping):
         fast = Port(UnilateralWall(1000.0, damping), device, 1).forces(x)
         # rounding: the engine's positions are those of the disc's centre, 10 mm away
         assert np.allclose(ours, fast, atol=1e-10)
+
+
+def test_a_device_of_another_rate_than_the_scene_is_refused_and_a_law_s_own_rate_is_its_own():
+    loop = CoupledLoop(wall_scene("PB", 1000.0, 50.0), "PB")
+    with pytest.raises(ArgumentError, match="rate"):
+        check_force(loop, BareDevice(1000.0), start=loop.start(1))
+    wall = PenaltyWall(1000.0)
+    object.__setattr__(wall, "rate", 0.0)
+    assert check_force(wall, BareDevice(damping=1.0), effort=0.05).passed
 
 
 def test_saturated_forces_stay_within_the_limit():
