@@ -132,7 +132,8 @@ class Harmless:
     """
 
     def __init__(self, stream: Any, kept: re.Pattern[str]) -> None:
-        self._stream, self._kept = stream, kept
+        self._stream = stream
+        self._kept = kept
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)
@@ -176,7 +177,8 @@ def main(arguments: list[str] | None = None) -> int:
     if arguments is None:
         signal.signal(signal.SIGTERM, _end_politely)
         _open_closed_streams()
-    out, err = cast(Any, Harmless(sys.stdout, _COLOUR)), cast(Any, Harmless(sys.stderr, _BARS))
+    out = cast(Any, Harmless(sys.stdout, _COLOUR))
+    err = cast(Any, Harmless(sys.stderr, _BARS))
     with redirect_stdout(out), redirect_stderr(err):
         status = _status(sys.argv[1:] if arguments is None else arguments)
     if arguments is None:
@@ -203,7 +205,8 @@ def _status(given: list[str]) -> int:
         _refuse_empty(given)
         return _app(given)(args=given, prog_name="iapb", standalone_mode=False) or 0
     except (KeyboardInterrupt, typer.Abort):
-        status, said = 130, STOPPED
+        status = 130
+        said = STOPPED
     except (IapbError, OSError, ModuleNotFoundError) as missing:
         error = (
             name_the_extra(missing, "The command")
@@ -212,7 +215,8 @@ def _status(given: list[str]) -> int:
         )
         if "--debug" in given or not isinstance(error, IapbError | OSError):
             raise
-        status, said = 1, str(error)
+        status = 1
+        said = str(error)
         if isinstance(error, RunFileError):  # a file's name may hold line ends
             said = "\\n".join(said.splitlines())
         if isinstance(error, OSError) and error.filename is not None and error.strerror:
@@ -222,7 +226,9 @@ def _status(given: list[str]) -> int:
         if not (hasattr(usage, "show") and hasattr(usage, "exit_code")):
             raise
         usage.show(file=sys.stderr)
-        status, said, explained = usage.exit_code, usage.format_message(), True
+        status = usage.exit_code
+        said = usage.format_message()
+        explained = True
     if not explained:
         print(f"iapb: {harmless(said)}", file=sys.stderr)
     if "--json" in given:

@@ -19,7 +19,8 @@ from verification.numbers import value_tables
 from verification.table import Table, titled
 
 NUMBERS_NAME = "numbers.json"
-FORMAT, FORMAT_VERSION = "iapb numbers", 2
+FORMAT = "iapb numbers"
+FORMAT_VERSION = 2
 LARGEST_FILE = 200_000_000  # bytes; a report's is a few million
 _TEXTS = ("runs", "provenance")
 _NOT_FINITE = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
@@ -44,7 +45,8 @@ class ReportNumbers:
 def collect_numbers(evidence: Evidence, figures: Iterable[Figure], depth: str) -> ReportNumbers:
     """Return every table and judged sentence of a report, each once, and the content hashes of its
     runs."""
-    tables, figures = dict(_of_evidence(evidence)), tuple(figures)
+    tables = dict(_of_evidence(evidence))
+    figures = tuple(figures)
     for figure in figures:
         if figure.numbers is not None and all(
             figure.numbers is not table for table in tables.values()

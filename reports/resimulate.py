@@ -147,10 +147,8 @@ def _made(kind: Any, settings: Any) -> Any:
 def differences(stored: Run, again: Run) -> tuple[Change, ...]:
     """Return every result that is not equal bit for bit; there is none if the content hashes are
     equal."""
-    heads, arrays = (
-        (result_head(stored), result_head(again)),
-        (dict(results_of(stored)), dict(results_of(again))),
-    )
+    heads = (result_head(stored), result_head(again))
+    arrays = (dict(results_of(stored)), dict(results_of(again)))
     found = [
         Change(name, f"is {heads[1][name]}, was {old}")
         for name, old in heads[0].items()
@@ -171,7 +169,8 @@ def _changes(name: str, stored: np.ndarray, again: np.ndarray) -> Iterator[Chang
         yield Change(name, f"is {again.dtype} {again.shape}, was {stored.dtype} {stored.shape}")
     elif stored.tobytes() != again.tobytes():
         other = stored != again  # true for NaN on both sides
-        a, b = stored[other].astype(float), again[other].astype(float)
+        a = stored[other].astype(float)
+        b = again[other].astype(float)
         bits = np.isnan(a) & np.isnan(b)
         if np.all(bits):
             yield Change(

@@ -93,13 +93,16 @@ class Runner:
 
         The runs also count as used outside of it.
         """
-        outside, user_outside = self.used, self.user
+        outside = self.used
+        user_outside = self.user
         inside: dict[str, StoredFile] = {}
-        self.used, self.user = inside, user
+        self.used = inside
+        self.user = user
         try:
             yield inside
         finally:
-            self.used, self.user = outside, user_outside
+            self.used = outside
+            self.user = user_outside
             for run in inside.values():
                 self.use(run)
 

@@ -41,7 +41,8 @@ def run_command(scene: Scene, world: str, rendering: str = "full") -> str:
     """
     if scene.name not in scene_names():
         return ""
-    wanted, again = scene.resolved(), _shipped(scene.name).resolved()
+    wanted = scene.resolved()
+    again = _shipped(scene.name).resolved()
     sets = [f"{path}={json.dumps(value)}" for path, value in changes(again, wanted)]
     try:
         for path, value in parsed(sets).items():

@@ -103,7 +103,9 @@ def build(folder: Path) -> tuple[Path, Path]:
 def lowest(extra: str) -> list[str]:
     """Return the lowest versions that pyproject.toml allows, as requirements."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    extras, wanted, given = project["optional-dependencies"], list(project["dependencies"]), [extra]
+    extras = project["optional-dependencies"]
+    wanted = list(project["dependencies"])
+    given = [extra]
     while given:
         for one in extras.get(given.pop(), []):
             inner = re.match(r"iapb\[(.+)\]", one)

@@ -56,7 +56,8 @@ JUDGED = (
     "holds",
     "law",
 )  # columns with verdicts: of findings and cases, of single trials, of other engines
-IMPACTS, Q = 200, "trajectory/q"
+IMPACTS = 200
+Q = "trajectory/q"
 BLAS = {
     name: {"OPENBLAS_CORETYPE": name}
     for name in ("Haswell", "SkylakeX", "Sandybridge", "Zen", "Prescott")
@@ -219,7 +220,8 @@ def _run(command: list[str], setting: dict[str, str], log: Path) -> int:
 
 def run_tests(name: str, setting: dict[str, str], folder: Path, workers: str) -> dict[str, Any]:
     """Run the numerical tests; return how many passed and which failed."""
-    path, log = folder / name / "tests.xml", folder / name / "tests.log"
+    path = folder / name / "tests.xml"
+    log = folder / name / "tests.log"
     if not path.is_file():
         command = [
             sys.executable,
@@ -251,10 +253,8 @@ def run_runs(name: str, setting: dict[str, str], folder: Path, workers: str) -> 
     """Run every shipped scene in every world, and impacts; compare them with those of the
     default."""
     path = folder / name / "runs.json"
-    command, log = (
-        [sys.executable, __file__, "--child", "runs", str(path)],
-        path.with_suffix(".log"),
-    )
+    command = [sys.executable, __file__, "--child", "runs", str(path)]
+    log = path.with_suffix(".log")
     if not path.is_file() and _run(command, setting, log):
         return {"wrong": [f"runs were not computed: see {log}"]}
     theirs, ours = (
@@ -271,7 +271,8 @@ def run_runs(name: str, setting: dict[str, str], folder: Path, workers: str) -> 
         "wrong": [],
     }
     for label in theirs:
-        kind, equal = theirs[label]["kind"], theirs[label]["hashes"] == ours[label]["hashes"]
+        kind = theirs[label]["kind"]
+        equal = theirs[label]["hashes"] == ours[label]["hashes"]
         found[kind] += 1
         found[f"{kind} equal"] += equal
         if equal:
@@ -304,7 +305,8 @@ def _differences(first: Path, second: Path) -> tuple[float, float]:
             if old[key].shape != new[key].shape:
                 gaps[key] = np.inf
             elif old[key].dtype.kind in "fiu":
-                a, b = old[key].astype(float), new[key].astype(float)
+                a = old[key].astype(float)
+                b = new[key].astype(float)
                 gaps[key] = float(
                     np.max(
                         np.nan_to_num(
@@ -433,7 +435,8 @@ def _impacts() -> Iterator[tuple[str, str, list[tuple[str, Any]]]]:
 
     rng = np.random.default_rng(0)
     for number in range(IMPACTS):
-        d, c = int(rng.integers(1, 31)), int(rng.integers(1, 61))
+        d = int(rng.integers(1, 31))
+        c = int(rng.integers(1, 61))
         factor = rng.integers(-3, 4, size=(d, d))
         mass = np.ldexp(
             (factor @ factor.T + np.eye(d, dtype=int)).astype(float), int(rng.integers(-9, 10))

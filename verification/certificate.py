@@ -36,7 +36,9 @@ EXPORT_HEAD = "iapb impacts 2"  # first line of a file of exported impacts
 _CHECKED = 100  # integers confirm one in so many of the impacts that the bound decides
 _BATCH = 4096  # impacts whose mass matrices are in memory at once
 _STEPS = 1 << 16  # steps of a run that are in memory at once
-_PIECE, _ROWS = 1 << 26, 1 << 20  # bytes of its states, and rows of its contacts, likewise
+# bytes of its states, and rows of its contacts, likewise
+_PIECE = 1 << 26
+_ROWS = 1 << 20
 _INDEFINITE = (
     1e-12  # a negative eigenvalue of M beyond this share of the largest one is no rounding
 )
@@ -144,10 +146,8 @@ class Certificate:
 
 def exact_gain(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -> Fraction:
     """KE⁺ − KE⁻ = ½ (v⁺ᵀMv⁺ − v⁻ᵀMv⁻) as a rational number."""
-    (M, unit), (v, speed_unit) = (
-        _integers(mass_matrix),
-        _integers(np.array([v_minus, v_plus], np.float64)),
-    )
+    (M, unit) = _integers(mass_matrix)
+    (v, speed_unit) = _integers(np.array([v_minus, v_plus], np.float64))
     total = v[1] @ M @ v[1] - v[0] @ M @ v[0]
     return Fraction(total) * Fraction(2) ** (unit + 2 * speed_unit - 1)
 
@@ -176,7 +176,8 @@ def _finite(name: str, values: ArrayLike) -> Floats:
 
 def _impacts(mass_matrix: ArrayLike, v_minus: ArrayLike, **others: ArrayLike) -> list[Floats]:
     """Return M (1, d, d) or (n, d, d), v⁻ and the others (n, d), checked."""
-    masses, before = _finite("mass_matrix", mass_matrix), np.atleast_2d(_finite("v_minus", v_minus))
+    masses = _finite("mass_matrix", mass_matrix)
+    before = np.atleast_2d(_finite("v_minus", v_minus))
     masses = masses[None] if masses.ndim == 2 else masses
     if before.ndim != 2 or len(before) > before.size:
         raise ArgumentError("v_minus", before.shape, "shape (n, d), or (d,) of one impact, d > 0")
@@ -214,11 +215,9 @@ def judge_gains(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -
 def _judged(masses: Floats, before: Floats, after: Floats) -> Judged:
     signs = np.empty(len(before), np.int64)
     gain_signs(masses, before, after, signs)
-    gained, unsure, checked = (
-        signs > 0,
-        np.flatnonzero(signs == 0),
-        np.flatnonzero(signs)[::_CHECKED],
-    )
+    gained = signs > 0
+    unsure = np.flatnonzero(signs == 0)
+    checked = np.flatnonzero(signs)[::_CHECKED]
     for k in (*unsure, *checked):
         gains = exact_gain(masses[k % len(masses)], before[k], after[k]) > 0
         if signs[k] and gains != gained[k]:
@@ -286,17 +285,16 @@ def certify(run: Run) -> Certificate:
 def _pieces(run: Run, step: Integers) -> Iterator[Any]:
     """Yield what is certified of a run in pieces of limited memory; the arrays of the run may be in
     a file."""
-    steps, first = max(min(_STEPS, _PIECE // (24 * max(run.q.shape[1], 1))), 1), 0
+    steps = max(min(_STEPS, _PIECE // (24 * max(run.q.shape[1], 1))), 1)
+    first = 0
     while first == 0 or first < len(run.impulse):
         offsets = np.asarray(run.contacts.offsets[first : first + steps + 1])
         few = max(
             int(np.searchsorted(offsets, offsets[0] + _ROWS, side="right")) - 1, 1
         )  # contacts are bounded, too
         offsets = offsets[: few + 1]
-        last, hits = (
-            first + max(len(offsets) - 1, 1),
-            np.searchsorted(step, (first, first + len(offsets) - 1)),
-        )
+        last = first + max(len(offsets) - 1, 1)
+        hits = np.searchsorted(step, (first, first + len(offsets) - 1))
         columns = {
             "contacts": (
                 slice(offsets[0], offsets[-1]),
@@ -313,10 +311,8 @@ def _pieces(run: Run, step: Integers) -> Iterator[Any]:
             )
             for table, (rows, names) in columns.items()
         }
-        tables["contacts"].offsets, tables["impacts"].step = (
-            offsets - offsets[0],
-            step[slice(*hits)] - first,
-        )
+        tables["contacts"].offsets = offsets - offsets[0]
+        tables["impacts"].step = step[slice(*hits)] - first
         yield SimpleNamespace(
             law=run.law,
             law_settings=run.law_settings,
@@ -330,7 +326,10 @@ def _pieces(run: Run, step: Integers) -> Iterator[Any]:
 
 def _total(run: Any) -> float:
     """Return `Certificate.total` of a piece, whose numbers must be finite."""
-    table, contacts, sums, size = run.impacts, run.contacts, -run.impulse, np.abs(run.impulse)
+    table = run.impacts
+    contacts = run.contacts
+    sums = -run.impulse
+    size = np.abs(run.impulse)
     for name in ("q", "v_minus", "v_plus", "impulse", "scale"):
         _finite(f"impacts.{name}", getattr(table, name))
     for name in ("impulse", "normal", "point"):
@@ -345,7 +344,9 @@ def _batches(run: Any) -> Iterator[Batch]:
     """Yield M, v⁻, v⁺ and the generalized impulse of the recorded impacts in batches of
     `_BATCH`."""
     scene = scene_from_values(run.scene_resolved)
-    table, mechanism, begin = run.impacts, mechanism_of(scene), start_of(scene)[0]
+    table = run.impacts
+    mechanism = mechanism_of(scene)
+    begin = start_of(scene)[0]
     for start in range(0, len(table.step), _BATCH):
         chosen = slice(start, start + _BATCH)
         masses = mechanism.mass_matrices_of_run(begin, table.q[chosen])
@@ -432,13 +433,11 @@ def _refuse_indefinite(masses: Floats, start: int) -> None:
 
 def _certificate(batches: Iterable[Batch]) -> Certificate:
     """Judge impacts in batches of M, v⁻, v⁺ and impulse."""
-    judged, largest, momentum, first, shown = (
-        [Judged(np.zeros(0, np.bool_), 0, 0)],
-        0.0,
-        np.nan,
-        -1,
-        "",
-    )
+    judged = [Judged(np.zeros(0, np.bool_), 0, 0)]
+    largest = 0.0
+    momentum = np.nan
+    first = -1
+    shown = ""
     for masses, before, after, recorded in batches:
         done = sum(len(one.gained) for one in judged)
         judged.append(_judged(masses, before, after))
@@ -478,7 +477,8 @@ def _largest_share(error: Floats, size: Floats) -> float:
 def relative_gain(mass: ArrayLike, before: ArrayLike, after: ArrayLike) -> float:
     """Return (KE⁺ − KE⁻)/KE⁻, rounded with its sign kept: never to 0; infinite beyond 1.8e308, and
     from rest."""
-    gain, energy = exact_gain(mass, before, after), -exact_gain(mass, before, np.zeros_like(before))
+    gain = exact_gain(mass, before, after)
+    energy = -exact_gain(mass, before, np.zeros_like(before))
     if not gain or not energy:
         return np.inf if gain else 0.0
     try:
@@ -503,13 +503,13 @@ print(twice_energy(v_plus) - twice_energy(v_minus))  # above 0: the impact gaine
 def _contacts(run: Any, silent: bool) -> tuple[float, float]:
     """Return `Certificate.span` and `Certificate.restitution`; NaN for one that the record cannot
     decide."""
-    table, impacts, scene = run.contacts, run.impacts, scene_from_values(run.scene_resolved)
+    table = run.contacts
+    impacts = run.impacts
+    scene = scene_from_values(run.scene_resolved)
     if silent or not len(impacts.step):
         return np.nan, np.nan
-    mechanism, rubbing = (
-        mechanism_of(scene),
-        run.law_settings.get("friction_in_impacts") and scene.largest_friction > 0,
-    )
+    mechanism = mechanism_of(scene)
+    rubbing = run.law_settings.get("friction_in_impacts") and scene.largest_friction > 0
     if rubbing or scene.contact.self_collision_rows == "per_body":
         return np.nan, np.nan
     values = restitutions_of(scene, pairs_of(scene, shapes_of(scene)))
@@ -518,7 +518,9 @@ def _contacts(run: Any, silent: bool) -> tuple[float, float]:
     _, first, line = np.unique(impacts.step, return_index=True, return_inverse=True)
     moved = np.bincount(line, (impacts.q != impacts.q[first[line]]).any(axis=1)) > 0.0
     chosen = np.flatnonzero(~moved[line])
-    step, places, scales = impacts.step[chosen], impacts.q[chosen], impacts.scale[chosen]
+    step = impacts.step[chosen]
+    places = impacts.q[chosen]
+    scales = impacts.scale[chosen]
     if not len(step):
         return np.nan, np.nan
     steps, first, line = np.unique(step, return_index=True, return_inverse=True)
@@ -526,10 +528,14 @@ def _contacts(run: Any, silent: bool) -> tuple[float, float]:
     whole = np.bincount(line, scales != 1.0) == 0.0  # no impact of the step was scaled
     step_of = np.repeat(np.arange(len(run.impulse)), np.diff(table.offsets))
     struck = np.flatnonzero((table.impulse != 0.0) & np.isin(step_of, steps))
-    difference, size, residual = -run.impulse[steps], np.abs(run.impulse[steps]), 0.0
+    difference = -run.impulse[steps]
+    size = np.abs(run.impulse[steps])
+    residual = 0.0
     for start in range(0, len(struck), _BATCH):
         m = struck[start : start + _BATCH]
-        k, normal = np.searchsorted(steps, step_of[m]), table.normal[m]  # (11), (12): nᵀ(J_a − J_b)
+        # (11), (12): nᵀ(J_a − J_b)
+        k = np.searchsorted(steps, step_of[m])
+        normal = table.normal[m]
         rows_a, rows_b = (
             mechanism.rows_along(places[first[k]], body[m], table.point[m], normal)
             for body in (table.body_a, table.body_b)

@@ -185,7 +185,8 @@ class Check:
         cases."""
         parts = []
         for name, rows in by_part(table).items():
-            role, proof = _of_part(self.roles, name), _of_part(self.by_design, name)
+            role = _of_part(self.roles, name)
+            proof = _of_part(self.by_design, name)
             decides = not role and not proof
             judged = judge_part(name, rows, self._fresh(study, name) if decides else None)
             parts.append(
@@ -284,10 +285,8 @@ class Topic:
     ) -> dict[str, Table]:
         """Return the tables of some of the checks by key; the cases that raise are added to
         `failures`."""
-        study, tables = (
-            Study(run, depth, results={("table", key): table for key, table in known.items()}),
-            {},
-        )
+        study = Study(run, depth, results={("table", key): table for key, table in known.items()})
+        tables = {}
         for done, check in enumerate(checks):
             progress(done, len(checks))
             study.failures = []
@@ -306,7 +305,8 @@ class Topic:
     ) -> Finding:
         """Return the finding of tables by key of the check, with `given` parts after those of the
         checks."""
-        lost, parts = list[Failure](), list[Part]()
+        lost = list[Failure]()
+        parts = list[Part]()
         for check in self.checks:
             if check.key in tables:
                 judge = partial(check.judge, tables[check.key])

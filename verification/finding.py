@@ -37,7 +37,10 @@ LEAST_SHARE = 0.5
 # (its verdict is that of a machine-checked proof, and it enters no count of trials); or a formula as
 # printed whose failure is an erratum; or ours, beyond the paper; or a check with too few trials. The
 # last three never decide the claim.
-DESIGN, MISPRINT, BEYOND, FEW = "by design", "misprint", "beyond", "few trials"
+DESIGN = "by design"
+MISPRINT = "misprint"
+BEYOND = "beyond"
+FEW = "few trials"
 DECIDING = ("", DESIGN)
 # The verdicts in words, and what a claim comes to: those of its statement, and three that name what
 # is wrong with it.
@@ -55,8 +58,10 @@ IN_WORDS = dict(
         strict=True,
     )
 )
-HOLDS, FAILS = IN_WORDS[REPRODUCED], IN_WORDS[REFUTED]
-MISPRINTED, FAILS_IN = f"{HOLDS}, {MISPRINT}", f"{FAILS} in a named quantity"
+HOLDS = IN_WORDS[REPRODUCED]
+FAILS = IN_WORDS[REFUTED]
+MISPRINTED = f"{HOLDS}, {MISPRINT}"
+FAILS_IN = f"{FAILS} in a named quantity"
 KINDS = (
     HOLDS,
     MISPRINTED,
@@ -360,7 +365,8 @@ def with_failures(finding: Finding, failures: Sequence[Failure]) -> Finding:
     in the answer."""
     if not failures:
         return finding
-    every, count = (*finding.failures, *failures), len(failures)
+    every = (*finding.failures, *failures)
+    count = len(failures)
     said = "One case failed and is" if count == 1 else f"{count} cases failed and are"
     part = Part(
         f"{said} in no other number: {', '.join(failure.case for failure in failures)}.",

@@ -24,8 +24,11 @@ from verification.finding import NOT_COMPUTED, REPRODUCED, Finding, Part
 from verification.numbers import Values
 from verification.table import Row, Table
 
-STEP, IMPACT, ROBOT = "One step at rest", "One impact", "Dynamics of a robot"
-CALLED, BY_LEMKE = ", called from Python", "Lemke, compiled"
+STEP = "One step at rest"
+IMPACT = "One impact"
+ROBOT = "Dynamics of a robot"
+CALLED = ", called from Python"
+BY_LEMKE = "Lemke, compiled"
 
 
 def ratios(study: Study) -> Iterator[Row]:
@@ -55,7 +58,8 @@ def _ratio(
 
 def _step_ratios(races: Table) -> Iterator[Row]:
     for row in sorted(steps.hardest(races), key=lambda row: float(row["ratio"])):
-        ratio, limit = row["ratio"], row["target"]
+        ratio = row["ratio"]
+        limit = row["target"]
         yield _ratio(STEP, row["scene"], "MuJoCo", row["scene"], ratio, limit, ratio > limit)
 
 
@@ -66,7 +70,8 @@ def _printed_ratios(trials: Table) -> Iterator[Row]:
     )
     for contacts, factor in growth.FACTORS.items():
         if contacts in ours and contacts in theirs:
-            ratio, what = ours[contacts] / theirs[contacts], f"{contacts} contacts, rank 8"
+            ratio = ours[contacts] / theirs[contacts]
+            what = f"{contacts} contacts, rank 8"
             yield _ratio(IMPACT, what, PRINTED, what, ratio, 1.0 / factor, ratio > 1.0 / factor)
 
 
@@ -74,12 +79,15 @@ def _solver_ratios(pairs: Table) -> Iterator[Row]:
     """Yield a row per size: Lemke's method compiled by family; DAQP, and all solvers, from
     Python."""
     for row, holds in zip(pairs.records(), pairs.holds, strict=True):
-        family, method = row["impacts"], row["method"]
+        family = row["impacts"]
+        method = row["method"]
         if family == impact_times.STEPS or row["ratio"] is None:
             continue
-        what, against = f"{family}, 1 to 300 contacts{CALLED}", method
+        what = f"{family}, 1 to 300 contacts{CALLED}"
+        against = method
         if method == LEMKE:
-            what, against = f"{family}, 1 to 300 contacts", BY_LEMKE
+            what = f"{family}, 1 to 300 contacts"
+            against = BY_LEMKE
         elif method in impact_times.SOLVERS:
             against = "six solvers, one interface"
         case = f"{method}, {row['contacts']} contacts"
@@ -88,7 +96,8 @@ def _solver_ratios(pairs: Table) -> Iterator[Row]:
 
 def _robot_ratios(table: Table) -> Iterator[Row]:
     for row in table.records():
-        ratio, limit = row["ratio"], robots.LIMITS[row["form"]]
+        ratio = row["ratio"]
+        limit = robots.LIMITS[row["form"]]
         case = f"{row['quantity']}, {row['robot']}"
         yield _ratio(ROBOT, row["form"], "Pinocchio", case, ratio, limit, ratio > limit)
 
@@ -223,7 +232,8 @@ BENCH = Topic(
     times=quoted,
 )
 # What a report takes from the claims, and what follows from it.
-CLAIMED, DERIVED = (C19.key, C22.key), (EACH, RATIOS)
+CLAIMED = (C19.key, C22.key)
+DERIVED = (EACH, RATIOS)
 _LATER = (*CLAIMED, *(check.key for check in DERIVED))
 TOPIC = replace(
     BENCH,

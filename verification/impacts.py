@@ -27,7 +27,8 @@ def over(value: Floats, scale: Floats) -> Floats:
 # Singular values of the unit-scaled rows of A in this gap are neither clearly rounding nor clearly
 # motion. A correct resolver may treat them as either, so laws that compare velocities skip such
 # impacts.
-ROUNDING_BELOW, MOTION_ABOVE = 1e-13, 1e-5
+ROUNDING_BELOW = 1e-13
+MOTION_ABOVE = 1e-5
 RANK_CUT = 1e-9  # anywhere in the gap
 INDEPENDENT = 1e-7  # ten times the motion that a resolver may leave in rows that it drops
 
@@ -159,7 +160,8 @@ class ImpactCase:
         dependent up to rounding are dependent exactly. A resolver in exact arithmetic takes the
         others as independent.
         """
-        values, rank = self._svd[0], len(self.row_space)
+        values = self._svd[0]
+        rank = len(self.row_space)
         if np.any((values > ROUNDING_BELOW) & (values < MOTION_ABOVE)):
             return False
         return rank == len(values) or rank == exact_rank(self.contact_jacobian)
@@ -244,7 +246,8 @@ RESTITUTIONS = (-1.0, 0.0, 0.5, 1.0, 1.0)
 # W = J M⁻¹ Jᵀ of rows this close has singular values down to closeness²: an inverse of W errs by ε
 # / closeness², 1e-6 to 1e-3, and numpy's cutoff of 1e-15 keeps them. Half of the errors are gains,
 # whichever BLAS rounds.
-ADVERSE, ADVERSE_CLOSENESS = 24, (5.0, 6.5)
+ADVERSE = 24
+ADVERSE_CLOSENESS = (5.0, 6.5)
 
 
 # Sizes and units that ordinary draws never reach. Every LARGE_EVERY-th impact is large and takes
@@ -252,7 +255,8 @@ ADVERSE, ADVERSE_CLOSENESS = 24, (5.0, 6.5)
 # that is slow.
 LARGE_EVERY = 10
 LARGE_KINDS = ("contacts", "coordinates", "contacts", "coordinates", "contacts and coordinates")
-LARGE_COORDINATES, LARGE_CONTACTS = (11, 40), (101, 500)
+LARGE_COORDINATES = (11, 40)
+LARGE_CONTACTS = (101, 500)
 # Powers of two about ±8 decades: scaling by them is exact, so dependent rows stay dependent.
 SCALE_POWERS = 27
 
@@ -267,7 +271,8 @@ def draw_wide_case(
     contacts = int(rng.integers(*LARGE_CONTACTS, endpoint=True)) if "contacts" in kind else None
     size = int(rng.integers(*LARGE_COORDINATES, endpoint=True)) if "coordinates" in kind else None
     case = draw_case(rng, largest_condition, coordinates=size, contacts=contacts)
-    name, v = case.family, case.velocity
+    name = case.family
+    v = case.velocity
     chance = rng.random()
     if chance < 0.15:
         name += ", at rest" if chance < 0.02 else ", partly at rest"
@@ -351,7 +356,8 @@ def with_spectrum(rng: np.random.Generator, spectrum: Floats) -> Floats:
 def draw_mass_matrix(rng: np.random.Generator, kind: str, d: int, condition: float) -> Floats:
     """Return a symmetric positive definite M (d, d) whose κ is of the order of `condition`."""
     spectrum = condition ** -np.sort(rng.uniform(0.0, 1.0, size=d))
-    spectrum[0], spectrum[-1] = 1.0, (1.0 / condition if d > 1 else 1.0)
+    spectrum[0] = 1.0
+    spectrum[-1] = 1.0 / condition if d > 1 else 1.0
     if kind == "identity":
         return np.eye(d)
     if kind == "diagonal":
@@ -448,7 +454,8 @@ ONE_SIDED_ROW_KINDS = (
     "none",
     "cradle",
 )
-ONE_SIDED_COORDINATES, ONE_SIDED_CONTACTS = 6, 6
+ONE_SIDED_COORDINATES = 6
+ONE_SIDED_CONTACTS = 6
 ONE_SIDED_POWERS = 10  # powers of two in M and v, about ±3 decades: they reveal absolute thresholds
 SIGNS = ("approaching", "approaching", "mixed")
 SWEEPS = 2000  # a tenth of the sweeps that the solver of the reference takes
@@ -466,10 +473,8 @@ def draw_one_sided_case(
 ) -> ImpactCase:
     """Return an impact of unilateral contacts, e in [0, 1]; in two of three impacts every contact
     approaches."""
-    d, c = (
-        int(rng.integers(1, ONE_SIDED_COORDINATES + 1)),
-        int(rng.integers(1, ONE_SIDED_CONTACTS + 1)),
-    )
+    d = int(rng.integers(1, ONE_SIDED_COORDINATES + 1))
+    c = int(rng.integers(1, ONE_SIDED_CONTACTS + 1))
     if rng.random() < 0.2:
         case = _standing_box(rng, c)
     else:
@@ -507,12 +512,14 @@ def draw_frictional_case(
 def _frictional_case(rng: np.random.Generator, number: int, largest_condition: float) -> ImpactCase:
     kind = FRICTIONAL_KINDS[number % len(FRICTIONAL_KINDS)]
     if kind == "generic":
-        d, c = int(rng.integers(2, ONE_SIDED_COORDINATES + 1)), int(rng.integers(1, 4))
+        d = int(rng.integers(2, ONE_SIDED_COORDINATES + 1))
+        c = int(rng.integers(1, 4))
         m = int(rng.integers(1, min(3, d)))
         mass = draw_mass_matrix(
             rng, _one_of(rng, MASS_KINDS), d, 10.0 ** rng.uniform(0.0, np.log10(largest_condition))
         )
-        drawn, translations = rng.normal(size=(c, 1 + m, d)), None
+        drawn = rng.normal(size=(c, 1 + m, d))
+        translations = None
         rows = drawn / np.linalg.norm(drawn, axis=2, keepdims=True)
     else:
         mass, rows, translations = _bodies(rng, kind)
@@ -580,10 +587,8 @@ def _bodies(rng: np.random.Generator, kind: str) -> tuple[Floats, Floats, Floats
         )
         return np.diag([1.0, 1.0, 1.0, *inertia[:3]]), rows, None
     count = int(rng.integers(1, 4))
-    angles, arms = (
-        rng.uniform(0.0, 2.0 * np.pi, size=count),
-        rng.uniform(-0.5, 0.5, size=(2, count, 2)),
-    )
+    angles = rng.uniform(0.0, 2.0 * np.pi, size=count)
+    arms = rng.uniform(-0.5, 0.5, size=(2, count, 2))
     axes = [
         np.column_stack([np.cos(turned), np.sin(turned)])
         for turned in (angles + 0.5 * np.pi, angles)
@@ -666,7 +671,8 @@ def whole_numbers(family: Family, count: int, seed: int) -> Iterator[ImpactCase]
 def _rows_of_rank(rng: np.random.Generator, family: Family) -> Floats:
     """Return integer rows (c, d) of exact rank `family.rank`; the first `rank` of them are
     independent."""
-    rank, spare = family.rank, family.contacts - family.rank
+    rank = family.rank
+    spare = family.contacts - family.rank
     while True:
         basis = rng.integers(-WHOLE, WHOLE + 1, (rank, family.coordinates)).astype(np.float64)
         if np.linalg.matrix_rank(basis) == rank:
@@ -712,7 +718,8 @@ def _timed_problem(
         mass_condition=condition,
         closeness=closeness,
     )
-    whitened, length = case.rows, np.linalg.norm(case.rows, axis=1)
+    whitened = case.rows
+    length = np.linalg.norm(case.rows, axis=1)
     approach = -whitened.T @ (rng.uniform(0.2, 1.0, size=c) / np.where(length > 0.0, length, 1.0))
     sliding = rng.normal(size=d)
     _, values, right = np.linalg.svd(whitened, full_matrices=False)
@@ -753,7 +760,8 @@ def draw_extreme_case(rng: np.random.Generator) -> ImpactCase:
     """Return M, J and v with magnitudes between the smallest and the largest double; M is not
     always a mass matrix."""
     d = int(rng.integers(1, 7))
-    kind, rows_kind = str(rng.choice(EXTREME_MASSES)), str(rng.choice(EXTREME_ROWS))
+    kind = str(rng.choice(EXTREME_MASSES))
+    rows_kind = str(rng.choice(EXTREME_ROWS))
     mass = draw_mass_matrix(
         rng, "graded" if kind == "graded" else "spectral", d, 10.0 ** rng.uniform(0.0, 18.0)
     )
@@ -825,7 +833,8 @@ def draw_impacts(rng: np.random.Generator, family: str, n: int, d: int, c: int) 
         "M asymmetric in the last bit",
     ):  # rows random in the kinetic metric
         values, axes = np.linalg.eigh(mass)
-        columns, v = (axes * np.sqrt(np.abs(values))[:, None, :]) @ columns, axes[:, :, 0]
+        columns = (axes * np.sqrt(np.abs(values))[:, None, :]) @ columns
+        v = axes[:, :, 0]
     if family == "nearly dependent rows":
         columns = columns[:, :, :1] + 10.0 ** -rng.uniform(3.0, 14.0, (n, 1, 1)) * columns
     if family == "M asymmetric in the last bit":
@@ -839,17 +848,16 @@ def draw_impacts(rng: np.random.Generator, family: str, n: int, d: int, c: int) 
             * np.ldexp(1.0, rng.integers(-1074, -1050, n).astype(np.int32))[:, None]
         )
     if family == "600 decades":  # the energy fits a double, some products do not
-        unit, speed = (
-            10.0 ** rng.uniform(-75.0, 75.0, (n, d)),
-            10.0 ** rng.uniform(-75.0, 75.0, (n, 1)),
-        )
+        unit = 10.0 ** rng.uniform(-75.0, 75.0, (n, d))
+        speed = 10.0 ** rng.uniform(-75.0, 75.0, (n, 1))
         mass = (
             mass
             * unit[:, :, None]
             * unit[:, None, :]
             * 10.0 ** rng.uniform(-120.0, 120.0, (n, 1, 1))
         )
-        columns, v = columns * unit[:, :, None], v / unit * speed
+        columns = columns * unit[:, :, None]
+        v = v / unit * speed
     if family == ANY_RANK:
         columns, v = _of_any_rank(rng, mass, columns, v)
     return Impacts(*(np.ascontiguousarray(array) for array in (mass, columns, v, e, 10.0**power)))
@@ -860,9 +868,12 @@ def _of_any_rank(
 ) -> tuple[Floats, Floats]:
     """Return generic, dependent, copied or nearly dependent rows, and each of rows and v in the
     kinetic metric or not."""
-    (n, d, c), kind, lower = columns.shape, rng.integers(4), np.linalg.cholesky(mass)
+    (n, d, c) = columns.shape
+    kind = rng.integers(4)
+    lower = np.linalg.cholesky(mass)
     rank = int(rng.integers(1, min(max(c, 1), d) + 1))
-    basis, near = rng.normal(size=(n, d, rank)), 10.0 ** -rng.uniform(1.0, 16.0, (n, 1, 1))
+    basis = rng.normal(size=(n, d, rank))
+    near = 10.0 ** -rng.uniform(1.0, 16.0, (n, 1, 1))
     if kind == 1:
         columns = basis @ rng.normal(size=(n, rank, c))
     if kind > 1:

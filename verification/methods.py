@@ -28,7 +28,8 @@ def gram_cholesky(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
     """Return v⁺ by (19), with Cholesky's factor of W; the rows must be independent."""
     push = np.linalg.solve(M, J.T)
     W = J @ push
-    length, scale = np.sqrt(np.maximum(np.diag(W), 0.0)), np.sqrt(np.diag(M))
+    length = np.sqrt(np.maximum(np.diag(W), 0.0))
+    scale = np.sqrt(np.diag(M))
     # The solution with M leaves the smallest eigenvalue of the Gram matrix of unit rows known to
     # c·ε·κ only.
     known = 8.0 * len(J) * EPS * np.linalg.cond(M / np.outer(scale, scale))

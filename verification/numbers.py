@@ -11,7 +11,9 @@ from typing import Any
 
 from verification.table import Table, titled
 
-NUMBERS, TIMES = "numbers", "numbers from times"  # names of the two tables
+# names of the two tables
+NUMBERS = "numbers"
+TIMES = "numbers from times"
 Values = Mapping[str, Any]
 
 

@@ -68,10 +68,8 @@ class Region:
 
 def _bound(key: str, unit: str, low: float | None, high: float | None) -> str:
     key = key.replace("_", " ")
-    least, most = (
-        "" if low is None else _inward(low, math.ceil),
-        "" if high is None else _inward(high, math.floor),
-    )
+    least = "" if low is None else _inward(low, math.ceil)
+    most = "" if high is None else _inward(high, math.floor)
     if low == high:
         return f"{key} = {least} {unit}".rstrip()
     if not least:
@@ -110,13 +108,15 @@ def confirmed(trials: Table, fresh: Callable[[Region], Table] | None) -> Region 
     if region is None or False in inside.holds:
         if fresh is None:
             return None
-        region, inside = search_region(trials), trials.only(())
+        region = search_region(trials)
+        inside = trials.only(())
     if region is None:
         return None
     drawn = fresh(region) if fresh else inside.only(())
     if False in drawn.holds:
         return None
-    others, new = inside.holds.count(True), drawn.holds.count(True)
+    others = inside.holds.count(True)
+    new = drawn.holds.count(True)
     if (new if fresh else others) < LEAST_CONFIRMING:
         return None
     return replace(region, others=others, fresh=new)
@@ -199,7 +199,8 @@ def _intervals(column: Column, trials: Table) -> list[_Interval]:
     values = trials.column(column.key)
     if not all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
         return []
-    seen, places = sorted(set(values)), np.array(values, float)
+    seen = sorted(set(values))
+    places = np.array(values, float)
     if len(seen) < 2:
         return []
     scale = math.log10 if seen[0] > 0 and seen[-1] / seen[0] >= _DECADES else float

@@ -272,8 +272,10 @@ def _series(mechanism: Mechanism, run: Run, reference: Run, every: int = 1) -> S
     )
     at = at[every * at <= run.steps]
     mine = every * at
-    q, v = reference.q[at], reference.v[at]
-    mass, whole = mechanism.mass_matrices(q), float(mechanism.arrays.mass.sum())
+    q = reference.q[at]
+    v = reference.v[at]
+    mass = mechanism.mass_matrices(q)
+    whole = float(mechanism.arrays.mass.sum())
     moved = np.array([mechanism.difference(*pair) for pair in zip(q, run.q[mine], strict=True)])
     faster = run.v[mine] - v
     forms: dict[str, Floats | None] = {
@@ -328,7 +330,8 @@ def _world(name: str, ran: Ran, apart: Series | None, fastest: float) -> Row:
     if (
         run.coupling != "unilateral"
     ):  # that coupler moves the tool at times, so there is no energy balance
-        work, above = float(work_given(run)[-1]), risen(run)
+        work = float(work_given(run)[-1])
+        above = risen(run)
         books = dict(zip(books, (work, 0.0 - float(above[-1]), float(above.max())), strict=True))
     touching = run.records_contacts
     return {
@@ -499,10 +502,8 @@ def _solved(study: ProblemStudy) -> Part:
         for row in study.rows
         if row.verdict == "failed" and np.isfinite(row.residuals.worst)
     )
-    answers, unsolved = (
-        solved + wrong.total(),
-        sum("solved" not in line.values() for line in study.lines),
-    )
+    answers = solved + wrong.total()
+    unsolved = sum("solved" not in line.values() for line in study.lines)
     sentence = (
         f"{solved} of {answers} answers are solutions, by residuals recomputed from the problem; "
         f"{len(study.lines) - unsolved} of {len(study.lines)} problems have one."

@@ -67,7 +67,8 @@ def _measured(source: Any, world: str) -> Answer:
         )
     with stage_progress() as progress:
         progress("with and without each effect", 0, 1)
-        table, times = effects_of(source, world), step_of(source, world)
+        table = effects_of(source, world)
+        times = step_of(source, world)
     found = table.records()
     columns = ("effect", "reason", *MEASURED)
     shown = titled(

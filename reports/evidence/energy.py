@@ -109,8 +109,10 @@ def _sum(table: Table, key: str) -> int:
 
 def numbers(tables: Mapping[str, Table]) -> Values:
     """Return what the pages quote."""
-    impacts, laws = tables[TABLE.key], tables[LAW_TABLE.key]
-    scenes, runs = tables[SCENES.key], tables[CERTIFIED_RUNS]
+    impacts = tables[TABLE.key]
+    laws = tables[LAW_TABLE.key]
+    scenes = tables[SCENES.key]
+    runs = tables[CERTIFIED_RUNS]
     told = ours(impacts)
     printed = impacts.where(method=PRINTED).records()[0]
     bare = impacts.where(method=NO_CLAMP).records()[0]

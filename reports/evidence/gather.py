@@ -79,7 +79,8 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
     )
     tilted = attempt(runs.TILTED, partial(runs.tilted_runs, runner), lost)
     for stage in stages.values():
-        ahead, fresh = stages.get(stage.name + AHEAD), not stage.path.is_file()
+        ahead = stages.get(stage.name + AHEAD)
+        fresh = not stage.path.is_file()
         _fill(stage, runner, depth, progress, ahead)
         if ahead is not None and fresh:
             ahead.failures.clear()  # the topic has tried these cases again
@@ -109,10 +110,8 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
     topics = [
         _failed(stages[name]) for name in CLAIM_STAGES if stages[name].records is None
     ] + topics
-    scenes, facts = (
-        {name: runs.shipped_scene(name).resolved() for name in SHOWN_SCENES},
-        provenance(),
-    )
+    scenes = {name: runs.shipped_scene(name).resolved() for name in SHOWN_SCENES}
+    facts = provenance()
     scene_effects = dict(stages["effects"].records or {})
     step_times = scene_effects.pop(effects.STEPS, None)
     measured = stages["accuracy"].records
@@ -161,7 +160,8 @@ def _fill(
 ) -> Stage:
     """Read or compute the records of a stage, unless it has been done; `ahead` has tables of its
     checks."""
-    plan, said = plans()[stage.name], partial(progress, stage.name)
+    plan = plans()[stage.name]
+    said = partial(progress, stage.name)
     known = {"known": ahead.records} if ahead is not None and not ahead.failures else {}
     if stage.records is None and not stage.failures:
         stage.fill(runner, lambda failures: plan.compute(runner, depth, said, failures, **known))

@@ -66,7 +66,8 @@ class Stage:
                 "machine": this_machine(),
             }
         )
-        self.name, self.kind = name, kind
+        self.name = name
+        self.kind = kind
         self.path = folder / f"{word}-{self.key[:16]}.h5"
         self.records: Any = None
         self.runs: dict[str, StoredFile] = {}
@@ -107,7 +108,8 @@ class Stage:
         provenance = collect_provenance() | {"sources": evidence_version()}
         content = {"runs": list(used.values()), "records": records}
         write_record(self.path, content, provenance)
-        self.records, self.runs = found, dict(used)
+        self.records = found
+        self.runs = dict(used)
 
     def _checked(self, records: Any) -> Any:
         """Return the records made of JSON; raise if they are not of the stage's type."""

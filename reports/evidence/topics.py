@@ -43,7 +43,8 @@ def _topic(name: str) -> Any:
 def failed_topic(name: str, failure: Failure) -> Finding:
     """Return a substitute for a topic that could not be computed; it says why."""
     sentence = f"Not computed, after {failure.error}: {failure.reason}."
-    key, title = name.replace(" ", "-"), name.replace("-", " ").capitalize()
+    key = name.replace(" ", "-")
+    title = name.replace("-", " ").capitalize()
     return finding_of(key, title, "", sentence, (Part(sentence, NOT_COMPUTED),))
 
 

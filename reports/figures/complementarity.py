@@ -31,7 +31,10 @@ from verification.table import Table
 Row = Mapping[str, Any]
 
 _TITLES = {"A": "A: posts far apart, both push", "B": "B: posts close, the formula must pull"}
-_THICK, _FLOOR, _LONG = 0.09, -0.55, 0.42  # of the bar, below it, of the longest arrow [m]
+# of the bar, below it, of the longest arrow [m]
+_THICK = 0.09
+_FLOOR = -0.55
+_LONG = 0.42
 _BORDER = ("cosine", "speed ratio", "agreement predicted", "agreement found")
 _WIDEST = 9.0  # [em] of the longest bar
 _KINDS = {
@@ -59,7 +62,8 @@ def condition(landings: Table, border: Table) -> Drawn:
 
 
 def _said(row: Row) -> str:
-    left, right = row["impulse at the left"], row["impulse at the right"]
+    left = row["impulse at the left"]
+    right = row["impulse at the right"]
     return f"A bar lands on two posts: the impulses are {left:.2g} and {right:.2g} N s."
 
 
@@ -104,7 +108,8 @@ def _bar(height: float, angle: float, about: float = 0.0) -> tuple[list[float], 
         (HALF_LENGTH, _THICK),
         (-HALF_LENGTH, _THICK),
     ]
-    c, s = math.cos(angle), math.sin(angle)
+    c = math.cos(angle)
+    s = math.sin(angle)
     x = [about + c * (a - about) - s * b for a, b in corners]
     y = [height + s * (a - about) + c * b for a, b in corners]
     return x, y

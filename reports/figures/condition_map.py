@@ -47,7 +47,8 @@ def condition_map(
     """
     units = {column.key: _SHOWN.get(column.unit, (column.unit, 1.0)) for column in table.columns}
     titles = {key: f"{key} [{unit}]" if unit else key for key, (unit, _) in units.items()}
-    ranks, drawn = {key: sorted(set(table.column(key))) for key in (x, y)}, []
+    ranks = {key: sorted(set(table.column(key))) for key in (x, y)}
+    drawn = []
     panels: dict[str, dict[tuple[float, float], list[bool | None]]] = {}
     for row, held in zip(table.records(), table.holds, strict=True):
         panel = ", ".join(

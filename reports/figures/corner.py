@@ -49,7 +49,8 @@ STRATEGIES = {
 }
 DEVICE = {"IAPB": "device/IAPB", "IAPB LM": "device/IAPB-LM", "PB": "device/PB"}
 
-MILLI, DEGREES = 1e3, 180.0 / np.pi
+MILLI = 1e3
+DEGREES = 180.0 / np.pi
 _COORDINATES = (("x", "mm", MILLI), ("y", "mm", MILLI), ("θ", "°", DEGREES))
 _FORCES = (("Fx", "N"), ("Fy", "N"), ("torque", "N m"))
 _BEFORE_CONTACT = 0.05  # [s] of the approach that a path shows
@@ -62,7 +63,8 @@ _MARKS = 9  # markers along a curve: enough to identify it in grey print, few en
 _APART = 0.05
 _LEAD = 5  # steps before the curves part that are shown
 # a pulse has no counterpart if none of this share of it is within so many steps around it
-_NEAR, _SMALL = 11, 0.1
+_NEAR = 11
+_SMALL = 0.1
 _LARGE = 10.0  # times the force that is held: a pulse
 _BALANCED = 0.01  # share of the hand's force
 _DIGITS = 9  # of millimetres: a picometre and less is rounding of the coordinates, not motion
@@ -115,7 +117,8 @@ def _figure(
 
 def measured_of(run: Run, trace: Trace, ideal: Trace | None, window: slice) -> dict[str, Any]:
     """Return the numbers of one curve by name: [mm], [°], [s], [N] and [N m]."""
-    force, state = trace.device_force, measures.settled_at(trace)
+    force = trace.device_force
+    state = measures.settled_at(trace)
     held = force[-max(int(_LAST_PART * len(force)), 1) :].mean(axis=0)
     hand = trace.hand_force[-1]
     found: dict[str, Any] = {
@@ -167,7 +170,8 @@ def _same_7(m: Measured) -> dict[str, bool]:
 
 
 def _same_8(m: Measured) -> dict[str, bool]:
-    ours, ideal = m["IAPB"], m["ideal"]
+    ours = m["IAPB"]
+    ideal = m["ideal"]
     return {
         "large at a new contact": all(each["Fx"] > _LARGE * each["held"] for each in (ours, ideal)),
         "then balances the hand": ours["balanced"],
@@ -204,7 +208,8 @@ def _same_11(m: Measured) -> dict[str, bool]:
 
 
 def _same_12(m: Measured) -> dict[str, bool]:
-    impulses, springs = ("IAPB", "IAPB LM"), m["PB"]
+    impulses = ("IAPB", "IAPB LM")
+    springs = m["PB"]
     rest = {
         curve: np.inf if each["settled"] is None else each["settled"] for curve, each in m.items()
     }
@@ -280,7 +285,8 @@ def _seen_apart(values: Sequence[Floats]) -> slice:
 
 def _forces(key: str, traces: Traces) -> list[Panel]:
     """Draw the forces along x and y at the first contact."""
-    window, dt = measures.comparison_window([*traces.values()]), next(iter(traces.values())).dt
+    window = measures.comparison_window([*traces.values()])
+    dt = next(iter(traces.values())).dt
     first, last = (window.start + round(seconds / dt) for seconds in _AT_CONTACT)
     panels = []
     for k, (name, unit) in enumerate(_FORCES[:2]):

@@ -169,10 +169,8 @@ def draw(
 
     If `failures` is None, an exception propagates.
     """
-    text, missing = (
-        TEXTS[recipe.key],
-        tuple(name for name in recipe.needs if inputs.get(name) is None),
-    )
+    text = TEXTS[recipe.key]
+    missing = tuple(name for name in recipe.needs if inputs.get(name) is None)
     bare = Figure(
         recipe.key,
         text.get("number", ""),
@@ -206,7 +204,10 @@ def draw(
 # A figure as a file of its own: panels side by side over the legend; colours are the fallbacks of
 # the page's variables
 
-_GAP, _LABEL, _LEGEND = 24.0, 26.0, 34.0  # points: between panels, above them, below them
+# points: between panels, above them, below them
+_GAP = 24.0
+_LABEL = 26.0
+_LEGEND = 34.0
 _LETTER = 6.4  # points: mean width of a letter of the legend
 _FONT = 'font-family="DejaVu Sans, Verdana, sans-serif" font-size="11"'
 _TABLE = (
@@ -267,7 +268,9 @@ def standalone(figure: Figure) -> str:
                 "<ul>{2}</ul>{3}<p>{4}</p>\n"
             ).format(figure.title, Markup(_TABLE), legend, panels, figure.caption)
         )
-    parts, x, tallest = [], _GAP, 0.0
+    parts = []
+    x = _GAP
+    tallest = 0.0
     for panel in figure.panels:
         width, height = (
             float(part) for part in re.findall(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', panel.svg)[0]
@@ -277,9 +280,11 @@ def standalone(figure: Figure) -> str:
         )
         place = f'<svg x="{x:g}" y="{_LABEL:g}" width="{width:g}" height="{height:g}"'
         parts.append(panel.svg.replace("<svg", place, 1))
-        x, tallest = x + width + _GAP, max(tallest, height)
+        x = x + width + _GAP
+        tallest = max(tallest, height)
     steps = [66 + _LETTER * len(text) for text, _ in figure.legend]
-    whole, below = max(x, sum(steps) + 2 * _GAP), tallest + _LABEL + _GAP + 0.5 * _LEGEND
+    whole = max(x, sum(steps) + 2 * _GAP)
+    below = tallest + _LABEL + _GAP + 0.5 * _LEGEND
     x = (whole - sum(steps)) / 2
     for (text, look), step in zip(figure.legend, steps, strict=True):
         parts.append(
@@ -289,7 +294,8 @@ def standalone(figure: Figure) -> str:
         )
         parts.append(f'<text x="{x + 44:g}" y="{below:g}" fill="{INK}">{escape(text)}</text>')
         x += step
-    width, height = whole, below + 0.5 * _LEGEND
+    width = whole
+    height = below + 0.5 * _LEGEND
     return "\n".join(
         [
             f'<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" '

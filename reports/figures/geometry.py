@@ -130,7 +130,8 @@ def bounds(points: Sequence[Floats], margin: float) -> tuple[Floats, Floats]:
     """Return the lower and upper corner of the box around all points, widened by a share of its
     longer side."""
     every = np.vstack(points)
-    low, high = every.min(axis=0), every.max(axis=0)
+    low = every.min(axis=0)
+    high = every.max(axis=0)
     return low - margin * max(high - low), high + margin * max(high - low)
 
 

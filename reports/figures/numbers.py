@@ -6,9 +6,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
-MINUS, DASH = "\N{MINUS SIGN}", "\N{EN DASH}"
+MINUS = "\N{MINUS SIGN}"
+DASH = "\N{EN DASH}"
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_PLAIN_FROM, _PLAIN_TO = 1e-3, 1e5  # outside of this range a power of ten reads better than zeros
+# outside of this range a power of ten reads better than zeros
+_PLAIN_FROM = 1e-3
+_PLAIN_TO = 1e5
 
 
 def format_number(value: float, digits: int = 4) -> str:

@@ -36,11 +36,10 @@ from reports.figures.style import (
 from verification.table import titled
 
 _LONGEST = 0.22  # arrow length of Figure 1, as a share of the picture
-_ARROW, _AXIS, _WALL = (
-    0.02,
-    0.006,
-    0.008,
-)  # Figure 4 [m]: an arrow per newton, the drawn axes, the walls shown
+# Figure 4 [m]: an arrow per newton, the drawn axes, the walls shown
+_ARROW = 0.02
+_AXIS = 0.006
+_WALL = 0.008
 _BOARD = (
     np.zeros(2),
     np.array([8.2, 5.2]),
@@ -113,8 +112,11 @@ def impact_and_step() -> Drawn:
 @recipe("fig01", "group/IAPB")
 def contact_forces(run: Run) -> Drawn:
     """Draw the hardest collision and the last resting instant of the run."""
-    impulses, forces, scene = run.contacts.impulse, run.contacts.normal_force, run.scene_resolved
-    touching, instants = np.flatnonzero(np.diff(run.contacts.offsets)), []
+    impulses = run.contacts.impulse
+    forces = run.contacts.normal_force
+    scene = run.scene_resolved
+    touching = np.flatnonzero(np.diff(run.contacts.offsets))
+    instants = []
     if impulses.any():
         hardest = (
             np.searchsorted(run.contacts.offsets, np.argmax(np.abs(impulses)), side="right") - 1
@@ -122,11 +124,14 @@ def contact_forces(run: Run) -> Drawn:
         instants.append(("(a) colliding: impulses", int(hardest), impulses, "N s"))
     if len(touching):
         instants.append(("(b) resting: forces", int(touching[-1]), forces, "N"))
-    panels, rows = list[Panel](), list[tuple[object, ...]]()
+    panels = list[Panel]()
+    rows = list[tuple[object, ...]]()
     for title, step, values, unit in instants:
-        pose, contacts = run.pose[step], range(*map(int, run.contacts.offsets[step : step + 2]))
+        pose = run.pose[step]
+        contacts = range(*map(int, run.contacts.offsets[step : step + 2]))
         low, high = bounds(body_outlines(scene, pose), 0.12)
-        longest, largest = _LONGEST * max(high - low), max(abs(values[k]) for k in contacts)
+        longest = _LONGEST * max(high - low)
+        largest = max(abs(values[k]) for k in contacts)
         with Canvas(f"fig01-{len(panels)}", low, high, turned=is_turned(scene)) as canvas:
             canvas.walls(scene)
             canvas.bodies(scene, pose)
@@ -213,7 +218,8 @@ def arm(scene: Mapping[str, Any], _: Mapping[str, Any]) -> Drawn:
     poses = list(body_placements(scene).values())[:2]
     joints = np.array([poses[0].origin[:2], *(frame.of((LENGTH, 0.0)) for frame in poses)])
     pivot = joints[0]
-    low, high = joints.min(axis=0) - (1.25, 0.22), joints.max(axis=0) + (1.25, 0.12)
+    low = joints.min(axis=0) - (1.25, 0.22)
+    high = joints.max(axis=0) + (1.25, 0.12)
     with Canvas("fig02", low, high, (3.6, 3.3)) as canvas:
         axes = canvas.axes
         axes.fill(
@@ -235,7 +241,8 @@ def arm(scene: Mapping[str, Any], _: Mapping[str, Any]) -> Drawn:
         for (name, distance), color in zip(
             CONTACTS.items(), (BLUE, VERMILION), strict=True
         ):  # opposite to the motion
-            point, normal = poses[1].of((distance, 0.0)), -poses[1].rotation[:2, 1]
+            point = poses[1].of((distance, 0.0))
+            normal = -poses[1].rotation[:2, 1]
             arrow(axes, point - 0.42 * normal, 0.36 * normal, color=color)
             note(
                 axes,
@@ -254,7 +261,8 @@ def arm(scene: Mapping[str, Any], _: Mapping[str, Any]) -> Drawn:
 @recipe("fig03", "arm_energies")
 def energy_loss(energies: Mapping[str, Floats]) -> Drawn:
     """Draw the figure from the table of `arm_energies`, a panel for each contact."""
-    e, panels = energies["restitution"], []
+    e = energies["restitution"]
+    panels = []
     for letter, contact in zip("ab", CONTACTS, strict=True):
         with Plot(f"fig03-{contact}") as plot:
             for reading, kinetic in zip(READINGS, ("7/3", "5"), strict=True):
@@ -315,10 +323,9 @@ def energy_loss(energies: Mapping[str, Floats]) -> Drawn:
 def peg_corner(scene: Mapping[str, Any]) -> Drawn:
     """Draw the peg at its start, from the resolved scene."""
     low, high = bounds([*body_outlines(scene), np.zeros((1, 2))], 0.12)
-    low, high = (
-        np.minimum(low, -_WALL),
-        np.maximum(high, _WALL),
-    )  # x to the left, y down: show some of both walls
+    # x to the left, y down: show some of both walls
+    low = np.minimum(low, -_WALL)
+    high = np.maximum(high, _WALL)
     with Canvas("fig04", low, high, turned=True) as canvas:
         canvas.walls(scene)
         canvas.bodies(scene)
@@ -340,7 +347,8 @@ def peg_corner(scene: Mapping[str, Any]) -> Drawn:
         "A small tilted rectangle above a floor and left of a wall, with the hand's force "
         "pointing to the lower right.",
     )
-    body, contact = scene["bodies"][0], scene["contact"]
+    body = scene["bodies"][0]
+    contact = scene["contact"]
     x, y, angle = body["position"]
     given = (
         ("peg size [mm]", [1e3 * side for side in body["shapes"][0]["size"]], "paper"),
@@ -487,7 +495,8 @@ def _block(
     """Draw a box with text in it."""
     from matplotlib.patches import FancyBboxPatch
 
-    x, y = center[0] - size[0] / 2, center[1] - size[1] / 2
+    x = center[0] - size[0] / 2
+    y = center[1] - size[1] / 2
     axes.add_patch(
         FancyBboxPatch(
             (x, y),

@@ -27,7 +27,9 @@ from reports.figures.style import (
     line_arguments,
 )
 
-TIME, PATH = "time", "path"  # the cursor reads curves over time
+# the cursor reads curves over time
+TIME = "time"
+PATH = "path"
 TOLERANCE = (
     0.01  # points, 1/30000 of the width of a panel: peaks and corners stay, straight runs go
 )
@@ -65,7 +67,11 @@ class Plot:
         shape: tuple[int, int] = (1, 1),
         frames: Sequence[Sequence[float]] = (),
     ) -> None:
-        self.key, self.size, self.kind, self.bare, self.shape = key, size, kind, bare, shape
+        self.key = key
+        self.size = size
+        self.kind = kind
+        self.bare = bare
+        self.shape = shape
         self.frames = frames or ([(0.0, 0.0, 1.0, 1.0)] if bare else [])
         self.svg = ""
         self.words: dict[str, str] = {}
@@ -120,7 +126,8 @@ class Plot:
         for line in self.axes.lines:
             line.get_path().simplify_threshold = TOLERANCE
         svg = to_svg(self.drawing, self.key)
-        place, (width, height) = self.axes.get_position(), 72.0 * self.drawing.get_size_inches()
+        place = self.axes.get_position()
+        (width, height) = 72.0 * self.drawing.get_size_inches()
         frame = (
             width * place.x0,
             height * (1.0 - place.y1),
@@ -280,7 +287,8 @@ def note(
 # SVG: without date and metadata; coordinates rounded to 0.01 pt, colours as variables of the page,
 # text as text
 
-_NUMBER, _COMMAND = re.compile(r"-?\d+\.\d{3,}"), re.compile(r"\s*([MLCQz])\s*")
+_NUMBER = re.compile(r"-?\d+\.\d{3,}")
+_COMMAND = re.compile(r"\s*([MLCQz])\s*")
 _MARKERS = r"(?:<use [^>]*/>)+</g>"
 
 

@@ -12,17 +12,21 @@ from dataclasses import dataclass, replace
 from itertools import count
 from typing import Any
 
-INK, MUTED, RULE, PAPER = "#1b1f24", "#66707b", "#d9dde2", "#fffefc"
-WALL, PEG, FORCE, LINK = "#c9cdd2", "#dbe7f1", "#b3261e", "#8fa3b5"
-BLUE, VERMILION, GREEN, PURPLE, AMBER, SKY, NAVY = (
-    "#0072b2",
-    "#d55e00",
-    "#00896a",
-    "#a5508a",
-    "#b07d00",
-    "#3a97cf",
-    "#0b3f7d",
-)
+INK = "#1b1f24"
+MUTED = "#66707b"
+RULE = "#d9dde2"
+PAPER = "#fffefc"
+WALL = "#c9cdd2"
+PEG = "#dbe7f1"
+FORCE = "#b3261e"
+LINK = "#8fa3b5"
+BLUE = "#0072b2"
+VERMILION = "#d55e00"
+GREEN = "#00896a"
+PURPLE = "#a5508a"
+AMBER = "#b07d00"
+SKY = "#3a97cf"
+NAVY = "#0b3f7d"
 
 # hex value -> name of the page's variable; the hex value itself stays the fallback outside of the
 # page

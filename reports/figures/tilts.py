@@ -27,9 +27,13 @@ CURVES = {
     "CBuc": "rigid wall through a spring (CBuc)",
 }
 REMEDY = "impulses that only push (ours)"
-STRAIGHT, TILTED_BY = 0.015, 0.2  # [rad]: 0.86° and 11.5°
+# [rad]: 0.86° and 11.5°
+STRAIGHT = 0.015
+TILTED_BY = 0.2
 WINDOW = (-14.6, -8.8), (3.5, 6.4)  # [mm] of the path
-PAIR, WHOLE = (3.0, 2.0), (6.2, 1.75)  # inches
+# inches
+PAIR = (3.0, 2.0)
+WHOLE = (6.2, 1.75)
 
 
 @recipe("hero", "peg at every tilt")

@@ -39,10 +39,8 @@ def worlds(table: Table, series: Table) -> Drawn:
             shown = [name for name in shown if None not in series.where(world=name).column(key)]
             _curves(axes, series, key, factor, {name: looks[name] for name in shown})
             axes.set(title=title, xlabel="time [s]")
-        bars, spent = (
-            plot.each[5],
-            dict(zip(table.column("world"), table.column("time per step"), strict=True)),
-        )
+        bars = plot.each[5]
+        spent = dict(zip(table.column("world"), table.column("time per step"), strict=True))
         drawn = bars.barh(
             list(spent),
             list(spent.values()),
@@ -72,6 +70,7 @@ def _curves(axes: Any, series: Table, key: str, factor: float, looks: dict[str, 
         axes.yaxis.set_minor_formatter(lambda *_: "")
     for k, (name, look) in enumerate(looks.items()):
         mine = series.where(world=name)
-        times, values = mine.column("time"), [factor * value for value in mine.column(key)]
+        times = mine.column("time")
+        values = [factor * value for value in mine.column(key)]
         apart = max(1, len(times) // 6)
         axes.plot(times, values, markevery=(k * apart // len(looks), apart), **line_arguments(look))

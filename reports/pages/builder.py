@@ -219,7 +219,8 @@ def unstated(parts: Iterable[Part], shown: Sequence[str]) -> list[Part]:
 
 def badge_words(topic: Finding) -> str:
     """Return the summary of a topic for the first page: how many of its findings fail."""
-    failing, total = sum(part.verdict == finding.REFUTED for part in topic.parts), len(topic.parts)
+    failing = sum(part.verdict == finding.REFUTED for part in topic.parts)
+    total = len(topic.parts)
     if failing and total > 1:
         return f"{failing} of {total} findings {'fails' if failing == 1 else 'fail'}"
     missing = topic.key == "proofs" and any(part.optional for part in topic.parts)

@@ -46,7 +46,8 @@ def _powers(text: str) -> Markup:
 
 
 def _power(match: re.Match[str]) -> str:
-    mantissa, exponent = match.group(1), int(match.group(2))
+    mantissa = match.group(1)
+    exponent = int(match.group(2))
     if float(mantissa) == 0.0:
         return "0"
     mantissa = mantissa.replace("-", "\N{MINUS SIGN}")

@@ -62,8 +62,10 @@ def spring(simulation: Simulation, pull: Pull, own: Floats) -> Floats:
     -------
     At the point that the hand holds, in world axes.
     """
-    port, mechanism = simulation.port, simulation.system.mechanism
-    q, v = simulation.state.q, simulation.state.v
+    port = simulation.port
+    mechanism = simulation.system.mechanism
+    q = simulation.state.q
+    v = simulation.state.v
     rotations, origins = mechanism.placements(q)
     point = origins[port.hand_body] + rotations[port.hand_body] @ pull.point
     arm = rotations[port.hand_body] @ (pull.point - port.hand_point)
@@ -99,7 +101,9 @@ def watch(simulation: Simulation, world: str, seconds: float, page: Any, clock: 
     mechanism = simulation.system.mechanism
     recorder = Recorder(simulation)
     stop: BaseException | None = None
-    was_pulled, late, latest = False, 0, 0.0
+    was_pulled = False
+    late = 0
+    latest = 0.0
     interrupted = Event()  # so that Ctrl-C ends the loop between two ticks, and every step is whole
     before = signal.signal(signal.SIGINT, lambda *_: interrupted.set())
     due = clock.monotonic()

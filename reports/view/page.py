@@ -22,8 +22,12 @@ Floats = NDArray[np.float64]
 GONE_SECONDS = 2.0  # without a browser until the page counts as closed; loading it again is faster
 _FRAME_SECONDS = 1.0 / 30.0
 _LOAD_SECONDS = 1.0  # from the first connection until the browser shows the scene
-_BODY, _TOOL, _WALL = (120, 144, 170), (214, 120, 60), (170, 170, 165)
-_FRONT, _SIDE = (0.0, 0.0, 2.2), (0.87, -1.0, 0.43)  # of the camera, in sizes of the scene
+_BODY = (120, 144, 170)
+_TOOL = (214, 120, 60)
+_WALL = (170, 170, 165)
+# of the camera, in sizes of the scene
+_FRONT = (0.0, 0.0, 2.2)
+_SIDE = (0.87, -1.0, 0.43)
 
 
 class Page:
@@ -56,7 +60,8 @@ class Page:
         self._frames = {name: add.add_frame(f"/{name}", show_axes=False) for name in names}
         tool = (scene.get("hand") or {}).get("body")
         for number, solid in enumerate(solids(scene)):
-            vertices, faces = solid.vertices.astype(np.float32), solid.faces.astype(np.uint32)
+            vertices = solid.vertices.astype(np.float32)
+            faces = solid.faces.astype(np.uint32)
             color = _TOOL if solid.body == tool else _BODY if solid.body else _WALL
             mesh = add.add_mesh_simple(
                 f"/{solid.body or 'world'}/{number}", vertices, faces, color=color, side="double"
@@ -112,9 +117,11 @@ class Page:
         """Set the camera: planar scenes from the front, others from the side, z up."""
         low, high = extent(scene)
         size = float(np.linalg.norm(high - low))
-        up, towards = (0.0, -1.0 if is_turned(scene) else 1.0, 0.0), _FRONT
+        up = (0.0, -1.0 if is_turned(scene) else 1.0, 0.0)
+        towards = _FRONT
         if is_spatial(scene):
-            up, towards = (0.0, 0.0, 1.0), _SIDE
+            up = (0.0, 0.0, 1.0)
+            towards = _SIDE
         camera = self._server.initial_camera
         camera.up = up
         camera.look_at = 0.5 * (low + high)

@@ -50,15 +50,15 @@ class Block:
 
 def read_blocks(name):
     """Return the blocks of a document in order."""
-    text, found = (ROOT / name).read_text(encoding="utf-8"), []
+    text = (ROOT / name).read_text(encoding="utf-8")
+    found = []
     for fenced in _FENCED.finditer(text):
         language, body = fenced.groups()
-        place, named = (
-            f"{name}:{text.count(chr(10), 0, fenced.start()) + 1}",
-            _FILE_LINE.match(body),
-        )
+        place = f"{name}:{text.count(chr(10), 0, fenced.start()) + 1}"
+        named = _FILE_LINE.match(body)
         if language == "text" and found[-1].kind == "python" and found[-1].expected is None:
-            found[-1].expected, found[-1].span = body, fenced.span(2)
+            found[-1].expected = body
+            found[-1].span = fenced.span(2)
         elif language == "console":
             found += [
                 Block(
@@ -85,10 +85,13 @@ def perform(name):
 
     Files are written first: what is imported once would not see a file that comes later.
     """
-    namespace, blocks = {"__name__": "document"}, read_blocks(name)
+    namespace = {"__name__": "document"}
+    blocks = read_blocks(name)
     answers = [{}] * len(blocks)
     for number, block in sorted(enumerate(blocks), key=lambda pair: pair[1].kind != "file"):
-        out, failure, path = io.StringIO(), "", Path(block.path)
+        out = io.StringIO()
+        failure = ""
+        path = Path(block.path)
         try:
             with redirect_stdout(out), redirect_stderr(out):
                 if block.kind == "file":

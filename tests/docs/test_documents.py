@@ -66,7 +66,8 @@ NUMBER = re.compile(r"(?<![\w.])([-+]?\d+(?:\.\d*)?(?:e[-+]?\d+)?)")
 
 def differs(printed, expected):
     """Return the first difference in words, or an empty text."""
-    given, gap = lines_of(printed), not lines_of(expected)
+    given = lines_of(printed)
+    gap = not lines_of(expected)
     for wanted in lines_of(expected):
         if wanted == "…":  # any lines: go on at the next line that fits
             gap = True
@@ -97,7 +98,8 @@ def lines_of(text):
 def fits(given, wanted):
     if "…" in wanted:
         return re.fullmatch(".*".join(map(re.escape, wanted.split("…"))), given) is not None
-    one, other = NUMBER.split(given), NUMBER.split(wanted)
+    one = NUMBER.split(given)
+    other = NUMBER.split(wanted)
     return (
         len(one) == len(other) and one[::2] == other[::2] and all(map(same, one[1::2], other[1::2]))
     )
@@ -110,7 +112,8 @@ def same(a, b):
 
 @pytest.mark.parametrize("name", DOCUMENTS)
 def test_document(name, tmp_path):
-    work, told = tmp_path / "work", tmp_path / "answers.json"
+    work = tmp_path / "work"
+    told = tmp_path / "answers.json"
     work.mkdir()
     environment = {
         **os.environ,
@@ -135,7 +138,8 @@ def test_document(name, tmp_path):
     )
     assert done.returncode == 0, done.stderr
     makefile = (ROOT / "Makefile").read_text()
-    pairs, wrong = list(zip(read_blocks(name), json.loads(told.read_text()), strict=True)), []
+    pairs = list(zip(read_blocks(name), json.loads(told.read_text()), strict=True))
+    wrong = []
     for block, answer in pairs:
         difference = "" if block.expected is None else differs(answer["output"], block.expected)
         if answer["failure"] or difference and not os.environ.get("IAPB_UPDATE_DOCS"):
@@ -203,7 +207,8 @@ def test_pictures_show_the_runs_of_today(figure, name, shared):
     """What they say of themselves in words and numbers, such as the forces at the contacts."""
     drawn = shared / "figures" / f"{figure}.svg"
     if figure == "hero":  # of the runs of one tilt
-        start, scene = Condition(), load_scene(find_scene("peg_corner"))
+        start = Condition()
+        scene = load_scene(find_scene("peg_corner"))
         runs = {world: run_world(start.place(scene), world) for world in IGNORED}
         drawn.parent.mkdir(exist_ok=True)
         drawn.write_text(standalone(draw(hero, {TILTED: {start.tilt: runs}})), encoding="utf-8")

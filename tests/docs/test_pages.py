@@ -68,10 +68,8 @@ def test_the_names_and_units_of_notation_are_those_of_the_code_and_the_run_files
     code = "\n".join(
         path.read_text() for package in PACKAGES for path in (ROOT / package).rglob("*.py")
     )
-    words, names = (
-        set(re.findall(r"\w+", code)) | ledger,
-        set(re.findall(r"`([A-Za-z_][\w.]*)`", NOTATION)),
-    )
+    words = set(re.findall(r"\w+", code)) | ledger
+    names = set(re.findall(r"`([A-Za-z_][\w.]*)`", NOTATION))
     assert len(names) > 50 and not {name for name in names if not set(name.split(".")) <= words}
     assert not [name for name in ledger if f"`{name}`" not in NOTATION]
     rows = [
@@ -125,10 +123,8 @@ def test_names_of_the_packages_say_what_goes_in_and_out(package, name):
     text = inspect.getdoc(value) or ""
     assert text or not inspect.isclass(value)
     if inspect.isfunction(value):
-        signature, raises = (
-            inspect.signature(value),
-            re.search(r"^\s+raise ", inspect.getsource(value), flags=re.M),
-        )
+        signature = inspect.signature(value)
+        raises = re.search(r"^\s+raise ", inspect.getsource(value), flags=re.M)
         wanted = {
             "Parameters": signature.parameters,
             "Raises": raises,

@@ -98,8 +98,10 @@ def placed(values: Values, place: Place) -> Values:
     made = copy.deepcopy(values)
     space = made.get("dimensions") == 3
     axes = 3 if space else 2
-    scale, sign = place.scale, -1.0 if place.mirrored else 1.0
-    turn, flip = place.turn(space), place.flip[:axes, :axes]
+    scale = place.scale
+    sign = -1.0 if place.mirrored else 1.0
+    turn = place.turn(space)
+    flip = place.flip[:axes, :axes]
 
     def vector(x: Any, length: float = scale) -> np.ndarray:
         return length * (turn[:axes, :axes] @ np.asarray(x, float))
@@ -112,7 +114,8 @@ def placed(values: Values, place: Place) -> Values:
 
     for body in made["bodies"]:
         velocity = np.array(body.get("velocity") or [0.0] * (2 * axes if space else 3))
-        linear, angular = velocity[:axes], velocity[axes:]
+        linear = velocity[:axes]
+        angular = velocity[axes:]
         body["position"][:axes] = moved(body["position"][:axes])
         if space:  # the velocity is in the axes of the body; an angular one has an axis
             body["position"][3:] = (
@@ -275,7 +278,8 @@ def plain() -> dict[str, Run]:
 def means_something(name: str, change: str) -> bool:
     """Whether a change can be made: blocks replace the floor of a plane, space has no polygons, and
     numbers of a scene are at most 1e9."""
-    values, (how, _, _) = CASES[name].scene, CHANGES[change]
+    values = CASES[name].scene
+    (how, _, _) = CHANGES[change]
     space = values.get("dimensions") == 3
     if how is in_two:
         return not space and FLOOR in values.get("walls", [])
@@ -287,7 +291,9 @@ def means_something(name: str, change: str) -> bool:
 
 def difference(plain: Run, changed: Run, values: Values, place: Place = SAME) -> float:
     """Return the largest difference of a final pose in shares of the size of the motion."""
-    found, size, shares = ends(changed), size_of(values), [0.0]
+    found = ends(changed)
+    size = size_of(values)
+    shares = [0.0]
     for body, expected in ends(plain).items():
         back = undone(found[body], place, values.get("dimensions") == 3)
         moved = max(size, float(np.abs(expected[:3]).max()))

@@ -9,7 +9,8 @@ from iapb.numerics.schema import blank, quantities
 from iapb.run import ContactTable, EffectRow, ImpactTable, Run
 from iapb.scene.mechanism import mechanism_of
 
-STEPS, UNTOUCHED = 128, 40
+STEPS = 128
+UNTOUCHED = 40
 NAMES = ("peg.x", "peg.y", "peg.theta")
 TEXTS = {
     "scene_name": "peg",
@@ -69,7 +70,8 @@ def made_run(steps=20, contacts=7, impacts=3, seed=0, **fields):
             for name, array in blank(listed, lengths).items()
         }
 
-    contact, impact = filled(quantities(ContactTable)), filled(quantities(ImpactTable))
+    contact = filled(quantities(ContactTable))
+    impact = filled(quantities(ImpactTable))
     contact |= {
         "offsets": np.array([0, *np.sort(rng.integers(0, contacts + 1, steps - 1)), contacts]),
         "gap": -np.abs(contact["gap"]),

@@ -40,7 +40,8 @@ ARGUMENTS = (
     "--disable-sync",
     "--enable-unsafe-swiftshader",
 )
-DESK, PHONE = (1400, 900), (400, 860)
+DESK = (1400, 900)
+PHONE = (400, 860)
 FIGURES = ("hero", "fig07", "fig08", "fig03")
 LEAST_CONTRAST = 4.5  # WCAG 2.2, level AA, text of ordinary size
 REAL = Path(__file__).parents[2] / "out" / "report.html"
@@ -167,7 +168,10 @@ class Sight:
     beside its own."""
 
     def __init__(self, page):
-        self.page, self.ask, self.errors, self.requests = page, page.evaluate, [], []
+        self.page = page
+        self.ask = page.evaluate
+        self.errors = []
+        self.requests = []
         page.on(
             "console",
             lambda said: said.type in ("error", "warning") and self.errors.append(said.text),
@@ -226,7 +230,8 @@ def pages_of(first):
 def test_each_page_is_whole(see, first, report, size):
     if report == "here" and not REAL.is_file():
         pytest.skip("no out/report.html here; `make reproduce` makes one")
-    figures, given = 0, first if report == "made up" else REAL
+    figures = 0
+    given = first if report == "made up" else REAL
     with see(given, size) as sight:
         for path in pages_of(given):
             sight.page.goto(path.as_uri())

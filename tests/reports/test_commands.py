@@ -261,7 +261,8 @@ def test_json_has_the_keys_that_the_documents_list_and_an_error_is_an_object_too
     for row, (status, line) in JSON.items():
         ended, found[row] = answer(*line.split())
         assert (row, ended, set(found[row])) == (row, status, listed(row))
-    ran, seen = found["run"], answer("inspect", found["run"]["file"], "--impacts", 2)[1]
+    ran = found["run"]
+    seen = answer("inspect", found["run"]["file"], "--impacts", 2)[1]
     assert len(seen["impacts"]) == min(2, seen["collisions"])
     assert (seen["end"], seen["steps"]) == (ran["end"], ran["steps"])
     assert {"energy", "effects", "provenance", "run_key", "content_hash"} <= set(seen)
@@ -556,7 +557,8 @@ def test_certify_judges_runs_and_archives_and_exports_them_as_integers(iapb, ans
 
 def test_bench_names_a_method_for_a_budget_and_prints_its_tables(iapb, answer, monkeypatch):
     choice = Choice(5e-5, 4, 3, "factored", "all rows", "compiled", 1e-6, 1e-16, 1e-15, 1.0, 1.0)
-    tables, asked = {"one": Table((Column("x"),), ((1,),))}, []
+    tables = {"one": Table((Column("x"),), ((1,),))}
+    asked = []
     finding = Finding("cost", "t", "q", "a", REPRODUCED, (Part("s", REPRODUCED),), tables)
     for name, stand_in in (
         ("which_method", lambda *given: asked.append(given) or (choice,)),
@@ -595,7 +597,8 @@ def test_compare_puts_worlds_on_one_page_and_stores_them_with_their_figure(iapb,
         if {"none", "friction"} & set(row)
     }
     assert by_solver["lemke"] == by_solver["nsgs"] == ["1", "1", "0", "0"]
-    place, slope = Path("mine/slope.json"), ("compare", SLOPE, "--set", "duration=0.05", "--worlds")
+    place = Path("mine/slope.json")
+    slope = ("compare", SLOPE, "--set", "duration=0.05", "--worlds")
     status, out, err = iapb(*slope, "IAPB,ideal,ideal-friction", "--out", place)
     lines = out.splitlines()
     assert status == 0 and max(map(len, lines)) <= show.WIDTH and len(lines) < 60, err

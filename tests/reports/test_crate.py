@@ -33,10 +33,8 @@ FIGURE = Figure("figA", "", "A", "See.", (PANEL,), titled(("x",), ((0.1,),)))
 def out(tmp_path_factory):
     """A small report from two runs and one stage, with everything beside it."""
     folder = tmp_path_factory.mktemp("elsewhere")
-    scene, runner = (
-        load_scene(find_scene("peg_corner")).with_values({"duration": 0.4}),
-        Runner(folder / "runs"),
-    )
+    scene = load_scene(find_scene("peg_corner")).with_values({"duration": 0.4})
+    runner = Runner(folder / "runs")
 
     def compute(failures):
         runner.user = "C07"

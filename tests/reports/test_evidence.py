@@ -236,7 +236,8 @@ def test_a_stage_with_failures_is_computed_again_and_its_traceback_is_kept_until
 
 
 def test_a_stage_computed_in_a_process_is_that_of_this_process(tmp_path, monkeypatch):
-    name, said = "proofs", []
+    name = "proofs"
+    said = []
     plan = topics.plans()[name]
     monkeypatch.setattr(gather, "plans", lambda: {name: plan})
     monkeypatch.setattr(gather, "_figure_runs", os.path.exists)  # which simulates nothing

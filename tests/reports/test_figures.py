@@ -164,10 +164,8 @@ def all_inputs():
         | {"IAPB-push": runs["corner/IAPB"]}
         for tilt in (0.015, 0.2)
     }
-    study, checks = (
-        Study(),
-        {f"{topic}/{check.key}": check for topic, checks in CHECKS.items() for check in checks},
-    )
+    study = Study()
+    checks = {f"{topic}/{check.key}": check for topic, checks in CHECKS.items() for check in checks}
     computed = {name: checks[name].table(study) for name in needed if name in checks}
     return {
         **runs,
@@ -182,7 +180,8 @@ def all_inputs():
 @pytest.fixture(scope="module")
 def gallery():
     """All figures by key, and the lines drawn for them."""
-    made, plotted = SimpleNamespace(inputs=all_inputs(), figures={}, lines=[]), Axes.plot
+    made = SimpleNamespace(inputs=all_inputs(), figures={}, lines=[])
+    plotted = Axes.plot
 
     def noted(axes, *args, **how):
         lines = plotted(axes, *args, **how)
@@ -220,15 +219,14 @@ def test_words_of_curves_stand_in_a_legend_above_the_axes():
 
 def test_a_name_has_one_colour_and_one_marker_in_every_figure(gallery):
     """A world keeps its look in all figures, and nothing else that is joined by a line has it."""
-    seen, looks = set(), [(look.color, look.marker, look.filled) for _, look in LOOKS]
+    seen = set()
+    looks = [(look.color, look.marker, look.filled) for _, look in LOOKS]
     assert len(set(looks)) == len(looks) and not {
         (look.color, look.marker) for look in CYCLE
     } & set(OF_WORLDS)
     for line in gallery.lines:
-        name, look = (
-            str(line.get_gid()).removeprefix("curve="),
-            (line.get_color(), line.get_marker()),
-        )
+        name = str(line.get_gid()).removeprefix("curve=")
+        look = (line.get_color(), line.get_marker())
         if name in STYLES:
             seen.add(name)
             assert look[0] == STYLES[name].color and look[1] in (STYLES[name].marker, "", "None"), (
@@ -294,7 +292,8 @@ def test_a_table_is_html_in_the_page_and_in_its_own_file(gallery):
 
 
 def test_figure_3_has_the_energies_that_follow_from_the_geometry():
-    table, share = arm_energies(), 1 - np.linspace(0.0, 1.0, 41) ** 2
+    table = arm_energies()
+    share = 1 - np.linspace(0.0, 1.0, 41) ** 2
     for reading, before, at_a, at_b in (
         ("uniform rods", 7 / 3, 0.379845, 0.0),
         ("point masses", 5.0, 0.0345, 1.0),
@@ -334,7 +333,8 @@ def test_numbers_for_people(value, text):
 def test_bodies_are_closed_with_their_outside_out_and_where_the_engine_has_them(name):
     """Triangles for the browser."""
     scene = load_scene(find_scene(name))
-    resolved, mechanism = scene.resolved(), System(scene).mechanism
+    resolved = scene.resolved()
+    mechanism = System(scene).mechanism
     for piece in solids(resolved):
         edges = {(face[i], face[i - 2]) for face in piece.faces.tolist() for i in range(3)}
         volumes = np.linalg.det(piece.vertices[piece.faces] - piece.vertices.mean(axis=0))

@@ -76,7 +76,8 @@ def test_a_run_comes_back_bit_for_bit(tmp_path, shape):
 
 
 def test_a_run_saves_itself_and_replaces_a_file_only_if_asked(tmp_path):
-    first, other = made_run(), made_run(seed=1)
+    first = made_run()
+    other = made_run(seed=1)
     for run, replace, kept in ((first, False, first), (other, False, first), (other, True, other)):
         assert content_hash(
             read_run(run.save(tmp_path / "run.h5", replace=replace))

@@ -37,7 +37,10 @@ class Outline(HTMLParser):
 
     def __init__(self, page):
         super().__init__()
-        self.ids, self.links, self.open, self.wrong = [], [], [], []
+        self.ids = []
+        self.links = []
+        self.open = []
+        self.wrong = []
         self.feed(page)
 
     def handle_starttag(self, tag, attrs):

@@ -215,7 +215,8 @@ def test_a_foreign_file_is_refused_in_one_sentence(text, tmp_path, capsys):
 def remade(monkeypatch):
     """Stand in for the hours of computing: `reproduce --check` makes the report that is put
     here."""
-    made, folders = [REPORT], []
+    made = [REPORT]
+    folders = []
 
     def make_report(out, depth):
         folders.append(out)

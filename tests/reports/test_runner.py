@@ -28,8 +28,10 @@ INPUTS = {"scene": {"name": "peg", "rate": 512}, "law": "IAPB"}
 
 
 def test_a_finished_run_is_neither_computed_again_nor_overwritten_and_a_partial_one_is(tmp_path):
-    store, run = RunStore(tmp_path), made_run()
-    partial, label = made_run(steps=10, complete=False), "peg corner/IAPB"
+    store = RunStore(tmp_path)
+    run = made_run()
+    partial = made_run(steps=10, complete=False)
+    label = "peg corner/IAPB"
     place = store.place_of(INPUTS, label)
     assert not store.fetch(place, lambda: partial)[0].complete
     assert read_run(place.partial).steps == 10 and not place.path.exists() and store.entries() == ()

@@ -61,9 +61,11 @@ def store(action, folder):
 def test_every_kind_of_file_is_told_and_a_damaged_run_is_computed_again_where_it_was_removed(
     filled, capsys
 ):
-    folder, (spoilt, whole) = filled / "runs", runs(filled)
+    folder = filled / "runs"
+    (spoilt, whole) = runs(filled)
     assert store("check", filled) == 0
-    scene, run = shipped_scene("peg_corner", SHORT), read_run(spoilt)
+    scene = shipped_scene("peg_corner", SHORT)
+    run = read_run(spoilt)
     with h5py.File(spoilt, "r+") as file:
         move(file)
     write_run(whole.with_name("unfinished.h5.partial"), run)
@@ -120,7 +122,8 @@ def slow_down(file):
 def test_what_another_program_writes_into_a_run_is_told_and_an_attribute_does_no_harm(
     tmp_path, edit, state, capsys
 ):
-    path, run = tmp_path / "run.h5", made_run()
+    path = tmp_path / "run.h5"
+    run = made_run()
     write_run(path, run, provenance={})
     with h5py.File(path, "r+") as file:
         edit(file)
@@ -230,7 +233,8 @@ def test_a_law_of_ones_own_is_made_again_where_a_world_has_it(tmp_path, monkeypa
 
 
 def test_everything_of_the_content_hash_is_compared():
-    run, others = made_run(), {}
+    run = made_run()
+    others = {}
     for group in RESULT_GROUPS:
         for quantity in GROUPS[group][0]:
             record = getattr(run, group) if group in ("contacts", "impacts") else run

@@ -80,7 +80,8 @@ def test_the_table_has_an_axis_for_each_path_and_says_what_its_runs_say(done):
 
 
 def test_a_point_that_has_a_file_is_not_simulated_again_and_a_missing_one_is(done, capsys):
-    before, finished = runs(done), table(done)
+    before = runs(done)
+    finished = table(done)
     lost = done / "small" / "runs" / min(before)
     lost.unlink()
     assert (
@@ -95,7 +96,8 @@ def test_a_point_that_has_a_file_is_not_simulated_again_and_a_missing_one_is(don
 
 def test_a_damaged_or_impossible_point_costs_its_own_row(done, tmp_path, capsys):
     damaged = done / "small" / "runs" / max(runs(done))
-    content, finished = damaged.read_bytes(), table(done)
+    content = damaged.read_bytes()
+    finished = table(done)
     damaged.write_bytes(content[:-100])
     assert sweep(done, "--json") == 1
     told = json.loads(capsys.readouterr().out)
@@ -155,7 +157,8 @@ def test_a_scheduler_that_dies_or_is_not_there_is_told_in_one_sentence(tmp_path)
     pytest.importorskip("distributed", reason="dask.distributed is not installed")
     with pytest.raises(ArgumentError, match="--dask"), executor(1, "nonsense://nowhere"):
         pass
-    place, kept = tmp_path / "scheduler.json", 0
+    place = tmp_path / "scheduler.json"
+    kept = 0
     where = ["--scheduler-file", str(place), "--no-dashboard"]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     roles = {
@@ -185,7 +188,8 @@ def test_a_scheduler_that_dies_or_is_not_there_is_told_in_one_sentence(tmp_path)
 
 
 def test_a_worker_of_another_version_or_without_the_folder_says_so(tmp_path):
-    scene, point = load_scene(find_scene("two_discs")), {"world": "IAPB"}
+    scene = load_scene(find_scene("two_discs"))
+    point = {"world": "IAPB"}
     for folder, code in ((tmp_path, "other code"), (tmp_path / "absent", code_version())):
         assert "another version of iapb" in simulate_point(scene, folder, code, point)["error"]
     assert not list(tmp_path.iterdir())

@@ -41,7 +41,9 @@ class Clock:
     """Time passes only while the loop sleeps, and by `work` [s] in each tick, by its number."""
 
     def __init__(self, work=None):
-        self.now, self.ticks, self.work = 100.0, 0, work or {}
+        self.now = 100.0
+        self.ticks = 0
+        self.work = work or {}
 
     def monotonic(self):
         return self.now
@@ -54,8 +56,12 @@ class Script:
     """A page that follows a script: from tick to pull, and from tick to what happens then."""
 
     def __init__(self, pulls=None, acts=None, closes=None, clock=None):
-        self.pulls, self.acts, self.closes, self.clock = pulls or {}, acts or {}, closes, clock
-        self.pull, self.shown = self.pulls.get(0), []
+        self.pulls = pulls or {}
+        self.acts = acts or {}
+        self.closes = closes
+        self.clock = clock
+        self.pull = self.pulls.get(0)
+        self.shown = []
 
     def show(self, poses):
         self.shown.append(poses)
@@ -70,7 +76,8 @@ class Script:
 
 
 def test_a_scene_that_nobody_pulls_runs_as_without_a_page_in_the_time_of_the_clock():
-    page, clock = Script(), Clock()
+    page = Script()
+    clock = Clock()
     seen = watch(simulation_of(), "IAPB", 0.5, page, clock)
     assert (seen.late, seen.latest, seen.run.remarks) == (0, 0.0, ())
     assert clock.now == pytest.approx(100.5)
@@ -82,7 +89,9 @@ def test_a_scene_that_nobody_pulls_runs_as_without_a_page_in_the_time_of_the_clo
 def test_the_mouse_pulls_the_tool_by_a_weak_spring_until_it_lets_go():
     pulls = {0: Pull(np.zeros(3), AWAY), 500: None}
     run = watch(simulation_of(), "IAPB", 2.5, Script(pulls), Clock()).run
-    own, released = np.array(PEG.hand.force), 1000  # two steps a tick
+    # two steps a tick
+    own = np.array(PEG.hand.force)
+    released = 1000
     before = run.hand_force[:released]
     assert np.all(run.hand_force[released:] == own) and not np.any(np.all(before == own, axis=1))
     most = 2.0 * 1.0 + np.hypot(*own[:2])  # 1 m/s² of 2 kg, and against the hand of the scene
@@ -97,7 +106,8 @@ def test_the_mouse_pulls_the_tool_by_a_weak_spring_until_it_lets_go():
 
 def test_a_pull_at_the_corner_turns_the_tool():
     simulation = simulation_of()
-    q, v = simulation.state.q, simulation.state.v
+    q = simulation.state.q
+    v = simulation.state.v
     v[:] = 0.0
     x, y, angle = q
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
@@ -254,7 +264,8 @@ def test_a_drag_pulls_the_gripped_point_of_the_tool_and_a_browser_that_goes_clos
         urllib.request.urlopen(root, timeout=20)
     with urllib.request.urlopen(page.address, timeout=20) as answer:
         assert b"<html" in answer.read().lower()
-    socket, protocol = page.address.replace("http:", "ws:"), [f"viser-v{viser.__version__}"]
+    socket = page.address.replace("http:", "ws:")
+    protocol = [f"viser-v{viser.__version__}"]
     with (
         pytest.raises(InvalidHandshake),
         connect(socket, origin="https://evil.example", subprotocols=protocol),

@@ -31,7 +31,9 @@ def elastic(n: int, d: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.n
     """M, v and the velocity after elastic impacts on one row each, rounded without any clamp: half
     of them gain."""
     rng = np.random.default_rng(seed)
-    root, rows, v = rng.normal(size=(n, d, d)), rng.normal(size=(n, d)), rng.normal(size=(n, d))
+    root = rng.normal(size=(n, d, d))
+    rows = rng.normal(size=(n, d))
+    v = rng.normal(size=(n, d))
     mass = root @ root.transpose(0, 2, 1) + np.eye(d)
     direction = np.linalg.solve(mass, rows[:, :, None])[:, :, 0]
     share = 2.0 * (rows * v).sum(axis=1) / (rows * direction).sum(axis=1)
@@ -70,9 +72,11 @@ def test_planted_gains_of_one_unit_in_the_last_place_are_all_found() -> None:
     """v⁺ = −v keeps the energy exactly; one unit in the last place along the momentum gains, the
     other way loses."""
     mass, v, _ = elastic(2000, 3, seed=2)
-    w, rng = -v, np.random.default_rng(3)
+    w = -v
+    rng = np.random.default_rng(3)
     momentum = np.einsum("nij,nj->ni", mass, w)
-    planted, widest = rng.choice(2000, 100, replace=False), np.abs(momentum).argmax(axis=1)
+    planted = rng.choice(2000, 100, replace=False)
+    widest = np.abs(momentum).argmax(axis=1)
     for k in range(2000):
         towards = np.inf if (momentum[k, widest[k]] > 0.0) == (k in planted) else -np.inf
         w[k, widest[k]] = np.nextafter(w[k, widest[k]], towards)
@@ -86,7 +90,8 @@ def test_planted_gains_of_one_unit_in_the_last_place_are_all_found() -> None:
 
 def test_gains_below_any_bound_are_left_to_integers() -> None:
     """A gain of 2^-200 of the energy: no double-double sees it."""
-    mass, v = np.eye(2), np.array([[1.0, 2.0**-100]])
+    mass = np.eye(2)
+    v = np.array([[1.0, 2.0**-100]])
     judged = judge_gains(mass, v, np.array([[-1.0, 2.0**-99]]))
     assert judged.gained.tolist() == [True]
     assert judge_gains(mass, v, np.array([[-1.0, 2.0**-101]])).gained.tolist() == [False]
@@ -172,7 +177,8 @@ def kept(run: Run, count: int) -> Run:
 def halved(run: Run) -> Run:
     """Half of every change of velocity: no gain, momentum and range(Jᵀ) fit, but no impact of the
     scene's e."""
-    table, contacts = run.impacts, run.contacts
+    table = run.impacts
+    contacts = run.contacts
     slower = replace(
         table, v_plus=0.5 * (table.v_minus + table.v_plus), impulse=0.5 * table.impulse
     )
@@ -330,11 +336,9 @@ def test_digest_is_of_m_made_again_which_in_the_engine_has_the_bits_of_the_step(
     """On a moving arm the M inside the step of each impact, hashed there, has the digest recorded
     after the run."""
     scene = load_scene(find_scene("three_link_arm_elastic"))
-    run, simulation, inside = (
-        simulate(scene, ImpulseAugmented(), steps=1000),
-        iapb.Simulation(scene),
-        [],
-    )
+    run = simulate(scene, ImpulseAugmented(), steps=1000)
+    simulation = iapb.Simulation(scene)
+    inside = []
     for step in range(run.steps):
         simulation.step()
         if step in run.impacts.step:

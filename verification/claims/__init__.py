@@ -62,7 +62,8 @@ def check_claims(
     chosen = tuple(CLAIMS) if ids is None else tuple(ids)
     if unknown := [name for name in chosen if name not in CLAIMS]:
         raise ArgumentError("ids", unknown, one_of(unknown[0], CLAIMS, "some of "))
-    study, say = Study(run, depth, **options), progress or (lambda *_: None)
+    study = Study(run, depth, **options)
+    say = progress or (lambda *_: None)
     results = []
     for done, name in enumerate(chosen):
         say(done, len(chosen), name)

@@ -79,7 +79,8 @@ def batches(
     cases = [*product(families, restitutions, plain), *product(*exact, rational)]
 
     def row(study: Study, case: tuple[Family, float, str]) -> Row:
-        (family, e, part), count = case, impacts[study.depth]
+        (family, e, part) = case
+        count = impacts[study.depth]
         errors, bound = parts[part]
         if bound is None:
             count = max(count // 4, LEAST_EXACT)
@@ -214,7 +215,8 @@ def _halved(family: Family, count: int, seed: int) -> Iterator[ImpactCase]:
     """Yield impacts as `draw_of_rank`, but with velocities of which an impact with e = 0 takes half
     of the energy."""
     for case in draw_of_rank(family, count, seed):
-        taken, rest = _taken(case), case.velocity - _taken(case)
+        taken = _taken(case)
+        rest = case.velocity - _taken(case)
         share = kinetic_energy(case.mass_matrix, rest) / kinetic_energy(case.mass_matrix, taken)
         yield replace(case, velocity=rest + taken * np.sqrt(share)) if share > 1e-9 else case
 
@@ -250,7 +252,8 @@ def _exact_misfits(batch: Batch) -> list[float]:
 
 def _exact_misfit(case: ImpactCase, e: Fraction) -> float:
     """|loss − ½(1 − e²) vᵀJᵀW†Jv|, in rational arithmetic."""
-    after, plastic = exact_impact(*case.arrays, e), exact_impact(*case.arrays, 0)
+    after = exact_impact(*case.arrays, e)
+    plastic = exact_impact(*case.arrays, 0)
     # With e = 0, v⁺ = v − Pv, so vᵀM(v − v⁺) = vᵀMPv is the quadratic form, computed independently
     # of the loss at e.
     form = -sum(
@@ -290,11 +293,10 @@ def _rows_apart(method: Callable[[Floats, Floats, Floats, float], Floats]) -> Me
     """Distance |v⁺(all rows) − v⁺(independent rows)| in the kinetic metric, relative to |v⁻|."""
 
     def distance(case: ImpactCase, e: float) -> float:
-        (mass, rows, velocity), rank = case.arrays, case.rank
-        everything, chosen = (
-            method(mass, rows, velocity, e),
-            gram_cholesky(mass, rows[:rank], velocity, e),
-        )
+        (mass, rows, velocity) = case.arrays
+        rank = case.rank
+        everything = method(mass, rows, velocity, e)
+        chosen = gram_cholesky(mass, rows[:rank], velocity, e)
         return float(
             np.sqrt(kinetic_energy(mass, everything - chosen) / kinetic_energy(mass, velocity))
         )
@@ -439,7 +441,8 @@ def random_change(rng: np.random.Generator, size: int, condition_number: float) 
 def _distance(case: ImpactCase, change: Floats, e: float) -> float:
     """|v⁺ − T w⁺| in the kinetic metric relative to |v⁻|, with M' = TᵀMT, J' = JT, w = T⁻¹v."""
     mass, rows, velocity = case.arrays
-    here, new_mass = resolve_impact(mass, rows, velocity, e).velocity, change.T @ mass @ change
+    here = resolve_impact(mass, rows, velocity, e).velocity
+    new_mass = change.T @ mass @ change
     there = resolve_impact(
         0.5 * (new_mass + new_mass.T), rows @ change, np.linalg.solve(change, velocity), e
     )
@@ -485,17 +488,16 @@ C06 = batches(
 
 # C08: passive for every e in [-1, 1], scaled and spread as well
 
-RANDOM, EXACT = "random impacts", "random impacts, in rationals"
+RANDOM = "random impacts"
+EXACT = "random impacts, in rationals"
 RENDERED = {
     rendering: [
         f"{how} impacts of the peg, {what}" for what in ("energy gain", "error of restitution")
     ]
     for rendering, how in (("scale", "Scaled"), ("spread", "Spread"))
 }
-_SIZES, _RESTITUTIONS = (
-    ((1, 1, 1), (3, 6, 3), (6, 20, 4), (12, 60, 8)),
-    (-1.0, -0.9, -0.5, 0.0, 0.5, 0.9, 1.0),
-)
+_SIZES = ((1, 1, 1), (3, 6, 3), (6, 20, 4), (12, 60, 8))
+_RESTITUTIONS = (-1.0, -0.9, -0.5, 0.0, 0.5, 0.9, 1.0)
 _PASSIVE = batches(
     "C08",
     "An impact is passive for every e in [-1, 1]; scaled or spread impulses act like another e in [-1, 1].",
@@ -568,7 +570,8 @@ def _without_impulse(study: Study, case: Family | Condition) -> Iterator[Row]:
             "error [m/s]": float(moved.max()),
         }
         return
-    penalty, scene = trace(study, case, "PB"), place(study, case)
+    penalty = trace(study, case, "PB")
+    scene = place(study, case)
     for part, e, bound in ((TRAJECTORY, -1.0, 0.0), (ALMOST, JUST_ABOVE, SAME_TRAJECTORY)):
         # scene files may not have a negative e
         contact = scene.contact.model_copy(update={"restitution": e})

@@ -16,9 +16,12 @@ from verification.table import Row
 if TYPE_CHECKING:
     from iapb.mechanics.mechanism import Mechanism
 
-ALL, SOME = "all", "part"
-RODS, POINTS = "uniform rods", "point masses at the ends of the links"
-PLACE_A, PLACE_B = 0.7, 0.5
+ALL = "all"
+SOME = "part"
+RODS = "uniform rods"
+POINTS = "point masses at the ends of the links"
+PLACE_A = 0.7
+PLACE_B = 0.5
 ANGLES = (0.0, 0.5, 1.0, 2.0)
 PLACES = (0.1, 0.3, 0.5, 0.6, 0.7, 0.9, 1.0)
 VELOCITY = np.array([1.0, 1.0])

@@ -94,7 +94,8 @@ class Condition:
 
     def place(self, scene: Scene) -> Scene:
         """Return the scene with the values of this condition."""
-        c, s = abs(np.cos(self.tilt)), abs(np.sin(self.tilt))
+        c = abs(np.cos(self.tilt))
+        s = abs(np.sin(self.tilt))
         x = self.clearance + HALF_SIZE[0] * c + HALF_SIZE[1] * s
         y = -(self.travel + HALF_SIZE[0] * s + HALF_SIZE[1] * c)
         return scene.with_values(
@@ -184,7 +185,9 @@ def drawn(tested: Sequence[Condition], region: Region, seed: int, count: int) ->
     ones. If `PATIENCE` starts in a row miss a thin region, further starts are drawn inside that
     region.
     """
-    rng, found, missed = np.random.default_rng(seed), list[Condition](), 0
+    rng = np.random.default_rng(seed)
+    found = list[Condition]()
+    missed = 0
     ends = {
         name: region.ends(name, [getattr(condition, name) for condition in tested])
         for name in UNITS

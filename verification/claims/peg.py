@@ -49,12 +49,15 @@ from verification.table import Row
 
 # Number of fresh starts that confirm a region. If a tenth of its starts fail, a region is confirmed
 # once in 24 times. MANY are drawn where most starts cannot tell, FEW where a start takes long.
-FEW, FRESH, MANY = 15, 30, 45
+FEW = 15
+FRESH = 30
+MANY = 45
 ALL_THREE = "together"
 # [m] √(inertia / mass) of the peg: the length of (x, y, θ) in the kinetic metric is √(x² + y² +
 # (ARM θ)²)
 ARM = 0.05
-OVERLAP, SETTLING = "overlap of the device's peg", "settling time"
+OVERLAP = "overlap of the device's peg"
+SETTLING = "settling time"
 # A trial cannot tell which world is closer to ideal if the lead of IAPB over its nearer rival is
 # below these bands: in RMS distance of the path [m, rad], and in mean distance of the force [N, N
 # m]. With the ideal world at four times the rate the lead changes by at most 7.9e-6, 2.0e-5, 2.9e-3
@@ -240,7 +243,8 @@ C10 = peg_claim(
 
 # C11: the forces
 
-LARGE, BALANCE = "peak force", "distance from balance in contact"
+LARGE = "peak force"
+BALANCE = "distance from balance in contact"
 CLOSEST = "force, mean distance to ideal"
 # Forces and their distances below this [N, N m] are rounding: no force acts along this coordinate.
 NOTHING = 1e-9
@@ -298,7 +302,9 @@ C11 = peg_claim(
 
 # C12: renderings on a device with force limits
 
-MOST, LEAST, INCREASES = "saturating loses most", "spreading loses least", "saturating increases it"
+MOST = "saturating loses most"
+LEAST = "spreading loses least"
+INCREASES = "saturating increases it"
 
 
 def agreed(differences: Any) -> float:
@@ -316,10 +322,8 @@ def _lost(study: Study, condition: Condition) -> Iterator[Row]:
     settling times."""
     ideal = trace(study, condition, "ideal")
     traces = {rendering: trace(study, condition, "IAPB", rendering) for rendering in RENDERINGS}
-    window, full = (
-        comparison_window([ideal, *traces.values()]),
-        settling_times(trace(study, condition, "IAPB")),
-    )
+    window = comparison_window([ideal, *traces.values()])
+    full = settling_times(trace(study, condition, "IAPB"))
     far = [root_mean_square(one, ideal, window) for one in traces.values()]
     found = {
         **dict(zip(COORDINATES, np.transpose(far), strict=True)),
@@ -334,7 +338,8 @@ def _lost(study: Study, condition: Condition) -> Iterator[Row]:
         }
         numbers = dict(zip(RENDERINGS, each[:, each.shape[1] // 2].tolist(), strict=True))
         if measure == SETTLING:
-            ahead[INCREASES], numbers["full"] = saturate - full, float(full[1])
+            ahead[INCREASES] = saturate - full
+            numbers["full"] = float(full[1])
         for claimed, differences in ahead.items():
             yield {
                 "measure": measure,
@@ -445,7 +450,8 @@ C14 = peg_claim(
 
 # C15: bounces and settling
 
-FEWER, SETTLES = "bounces strictly less", "settles strictly sooner"
+FEWER = "bounces strictly less"
+SETTLES = "settles strictly sooner"
 # More thresholds than the other claims have: at 40 mm/s most contacts of the corner do not collide.
 FURTHER_THRESHOLDS = (3e-3, 4e-2)
 
@@ -505,7 +511,8 @@ def _separation(study: Study, condition: Condition) -> Iterator[Row]:
     limited = share_limited(trace(study, condition, "IAPB", "scale"))
     for rendering in RENDERINGS:
         run = trace(study, condition, "IAPB", rendering)
-        (x, y, theta), whole = separation_by_impacts(run), largest_separation(run)
+        (x, y, theta) = separation_by_impacts(run)
+        whole = largest_separation(run)
         yield {
             "rendering": rendering,
             **condition.row(*LIMITED),

@@ -18,10 +18,15 @@ from verification.region import Region
 from verification.table import Row
 
 BOTH = "both filters"
-COHERENCE_ALONE, CLUSTERING = "coherence alone", "clustering alone"
-JUMP, REACH = "jump of the contact to the next facet", "relative coherence distance"
-SCENE, SCENE_FACETS = "faceted_socket", 9
-RADIUS, BALL_RADIUS = 0.2, 0.02  # [m]
+COHERENCE_ALONE = "coherence alone"
+CLUSTERING = "clustering alone"
+JUMP = "jump of the contact to the next facet"
+REACH = "relative coherence distance"
+SCENE = "faceted_socket"
+SCENE_FACETS = 9
+# [m]
+RADIUS = 0.2
+BALL_RADIUS = 0.02
 STEEP = math.radians(70.0)  # [rad] of the ball's start, from the lowest point
 LARGEST_SPEED = 1.2445  # [m/s] of a ball that rolls down from there without loss
 FACETS = (SCENE_FACETS, 18, 30, 60)  # in a right angle: 10° to 1.5° each

@@ -143,12 +143,11 @@ C20 = Check(
 
 # C21: impulses against larger damping
 
-SAME_DAMPING, EQUAL_GAIN, BOTH = (
-    "same damping",
-    "same first force",
-    "best damping of each law",
-)
-SETTLES, SOONER = "settles where springs do", "settles no later"
+SAME_DAMPING = "same damping"
+EQUAL_GAIN = "same first force"
+BOTH = "best damping of each law"
+SETTLES = "settles where springs do"
+SOONER = "settles no later"
 FRESH = 5  # number of walls per loop drawn to confirm a region
 Case = tuple[Loop, Floats]  # and the stiffnesses of its walls
 
@@ -168,20 +167,20 @@ def _draw(study: Study, region: Region) -> Iterator[Case]:
 def _settling(study: Study, case: Case) -> Iterator[Row]:
     """Yield the rows of the walls of one loop: impulses against penalties, at given dampings and at
     the best ones."""
-    (loop, stiffness), dampings = case, grid(study.depth)[1]
+    (loop, stiffness) = case
+    dampings = grid(study.depth)[1]
     raised = dampings[dampings >= PAPER_DAMPING]
     penalty, impulses = (
         one.settles_after[dampings >= PAPER_DAMPING] for one in maps_of(loop, stiffness, dampings)
     )
-    best, ours_best = penalty.argmin(axis=0), impulses.argmin(axis=0)
+    best = penalty.argmin(axis=0)
+    ours_best = impulses.argmin(axis=0)
     # the damping whose force at first contact equals the impulse's
     gain = (1.0 + loop.restitution) * loop.mass / loop.step
     sustained = touch_walls(loop, stiffness, np.array(gain), PENALTY).settles_after
     for i, K in enumerate(stiffness):
-        paper, tuned = (
-            (impulses[0, i], PAPER_DAMPING),
-            (impulses[ours_best[i], i], raised[ours_best[i]]),
-        )
+        paper = (impulses[0, i], PAPER_DAMPING)
+        tuned = (impulses[ours_best[i], i], raised[ours_best[i]])
         rival = penalty[best[i], i], raised[best[i]]
         rivals = (
             (SAME_DAMPING, SETTLES, paper, (penalty[0, i], PAPER_DAMPING)),
@@ -207,7 +206,8 @@ def _settling(study: Study, case: Case) -> Iterator[Row]:
 def _settles(row: Row) -> bool | None:
     """Return whether impulses settle where springs do, or no later; None if springs do not settle,
     or for equal times."""
-    ours, theirs = row["impulses settle after"], row["penalty settles after"]
+    ours = row["impulses settle after"]
+    theirs = row["penalty settles after"]
     if row["test"] == SETTLES:
         return bool(np.isfinite(ours)) if np.isfinite(theirs) else None
     return None if ours == theirs else bool(ours < theirs)

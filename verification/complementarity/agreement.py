@@ -79,8 +79,10 @@ def compare_case(case: ImpactCase) -> dict[str, Any]:
     problem = ImpactProblem.from_impact(*case.arrays, case.restitution)
     v = resolve_impact(*case.arrays, case.restitution).velocity
     law = newton_lcp(problem).velocity
-    upper, e = case.lower.T, case.restitution
-    before, change = upper @ case.velocity, upper @ (v - case.velocity)
+    upper = case.lower.T
+    e = case.restitution
+    before = upper @ case.velocity
+    change = upper @ (v - case.velocity)
     scale = float(np.abs(problem.gamma_minus).max(initial=0.0)) or 1.0
     rows = (
         case.contact_jacobian
@@ -149,7 +151,8 @@ def compare_cases(
     return [row for row in found if row is not None]
 
 
-PILES, NEIGHBOUR = "piles of spheres", "with a neighbour"
+PILES = "piles of spheres"
+NEIGHBOUR = "with a neighbour"
 COUNTS = {"quick": 25, "full": 250}  # impacts of each family, restitution and redundancy
 # e of the scene (None), and e = 0.5, which gives more impacts, some of which differ
 SCENE_RESTITUTIONS = (None, 0.5)
@@ -193,7 +196,8 @@ def _map_targets(table: Table) -> Iterator[Part]:
     yield Part.on("impacts that contradict the condition", sum(table["contradictions"]), 0)
 
 
-RANDOM, SCENE = "random", "scene"
+RANDOM = "random"
+SCENE = "scene"
 MAP = Check(
     key="map",
     question="Do the laws agree exactly where some p >= 0 gives IAPB's velocity?",
@@ -215,7 +219,8 @@ SPEED_RATIOS = (0.05, 0.25, 0.45, 0.65, 0.85, 1.0)
 
 def _grid(study: Study) -> list[tuple[float, float, ImpactCase]]:
     """Return the two-contact impacts on a grid; points with r = c are left out."""
-    rng, points = np.random.default_rng(2), product(COSINES, SPEED_RATIOS)
+    rng = np.random.default_rng(2)
+    points = product(COSINES, SPEED_RATIOS)
     return [
         (cosine, ratio, two_contacts(cosine, ratio, rng))
         for cosine, ratio in points

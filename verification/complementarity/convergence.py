@@ -32,10 +32,9 @@ from verification.table import HOLDS, Table
 TRUTH_SCENES = {
     path.stem: path for path in sorted((Path(__file__).parent / "scenes").glob("*.yaml"))
 }
-COARSE, FINE = (
-    (470.0, 500.0, 530.0),
-    (1880.0, 2000.0, 2120.0),
-)  # rates [Hz]; a factor of four between the levels
+# rates [Hz]; a factor of four between the levels
+COARSE = (470.0, 500.0, 530.0)
+FINE = (1880.0, 2000.0, 2120.0)
 _LEVELS = 4.0
 # The convergence counts as first order if the errors per step on the fine level are at most this
 # multiple of those on the coarse level. The positions of impacts within steps change the errors by
@@ -127,13 +126,15 @@ def converge(case: TruthCase, law: Any = None) -> list[dict[str, Any]]:
     None if the errors are rounding alone.
     """
     scene = scene_of(case.scene)
-    truth, law = scene_truth(scene, case.duration, case.coupled), law or RigidConstraints()
+    truth = scene_truth(scene, case.duration, case.coupled)
+    law = law or RigidConstraints()
     levels = [
         np.max([_errors(scene, case, truth, law, rate) for rate in level], axis=0)
         for level in (COARSE, FINE)
     ]
     _require_worth(case, truth, *levels[1])
-    (position, velocity), rows = zip(*levels, strict=True), []
+    (position, velocity) = zip(*levels, strict=True)
+    rows = []
     for rates, errors in zip((COARSE, FINE), levels, strict=True):
         step = len(rates) / sum(rates)
         rows.append(
@@ -167,7 +168,8 @@ def _order(coarse: float, fine: float) -> float | None:
 def _require_worth(case: TruthCase, truth: SceneTruth, position: float, velocity: float) -> None:
     """Raise SolverError if the bounds of the truth's errors, in the same norms, are too large to
     compare with."""
-    bound, last = truth.bound, min(1.0 / rate for rate in FINE)
+    bound = truth.bound
+    last = min(1.0 / rate for rate in FINE)
     _, v = truth.state(np.linspace(0.0, truth.end, 101))
     jumps = (
         2.0 * float(np.abs(v).max()) * bound.instant * len(truth.events)

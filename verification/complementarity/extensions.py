@@ -36,7 +36,8 @@ GAIN = 1e-12  # a relative gain of kinetic energy below this is rounding
 # Largest difference of two solvers of one law: ten times the residual that
 # `reference.complementarity.laws` accepts.
 SAME_LAW = 1e-8
-RESTITUTIONS, FRICTIONS = (0.0, 0.5, 1.0), (0.1, 0.5, 1.0)
+RESTITUTIONS = (0.0, 0.5, 1.0)
+FRICTIONS = (0.1, 0.5, 1.0)
 COUNTS = {"quick": 40, "full": 300}  # impacts of each e and μ
 UNEQUAL_COUNTS = {"quick": 100, "full": 1000}
 
@@ -44,8 +45,11 @@ UNEQUAL_COUNTS = {"quick": 100, "full": 1000}
 def draw(rng: np.random.Generator, approaching: bool) -> ImpactCase:
     """Draw an impact with one to three contacts, one or two tangents each, and three to eight
     coordinates."""
-    d, c, m = int(rng.integers(3, 9)), int(rng.integers(1, 4)), int(rng.integers(1, 3))
-    velocity, rows = rng.normal(size=d), rng.normal(size=(c, d))
+    d = int(rng.integers(3, 9))
+    c = int(rng.integers(1, 4))
+    m = int(rng.integers(1, 3))
+    velocity = rng.normal(size=d)
+    rows = rng.normal(size=(c, d))
     if approaching:
         rows = np.where(rows @ velocity > 0.0, -1.0, 1.0)[:, None] * rows
     mass = random_mass_matrix(rng, d)
@@ -71,11 +75,15 @@ def _distance(impact: ImpactCase, first: Floats, second: Floats) -> float:
 def with_friction(study: Study, case: tuple[float, float], seed: int = 44) -> Row:
     """Compare the engine's frictional impact with Coulomb's NCP and CCP on random impacts with one
     e and one μ."""
-    (e, mu), rng = case, np.random.default_rng(seed)
+    (e, mu) = case
+    rng = np.random.default_rng(seed)
     drawn = [draw(rng, approaching=True) for _ in range(COUNTS[study.depth])]
     impacts = [replace(one, restitution=e, friction=np.full(one.contacts, mu)) for one in drawn]
     pushing = same = reduced = unsolved = 0
-    of_ours, of_ncp, of_ccp, distances = list[float](), list[float](), list[float](), list[float]()
+    of_ours = list[float]()
+    of_ncp = list[float]()
+    of_ccp = list[float]()
+    distances = list[float]()
     for impact in impacts:
         mass, rows, v = impact.arrays
         ours = resolve_frictional_impact(*impact.given())
@@ -150,15 +158,15 @@ FRICTION = Check(
 def with_unequal(study: Study, signs: str, seed: int = 45) -> Row:
     """Compare the engine's law for unequal restitution with Poisson, the Newton LCP and plain
     equalities."""
-    rng, count = np.random.default_rng([seed, len(signs)]), UNEQUAL_COUNTS[study.depth]
-    distances, gains = [], np.zeros((count, 3))
+    rng = np.random.default_rng([seed, len(signs)])
+    count = UNEQUAL_COUNTS[study.depth]
+    distances = []
+    gains = np.zeros((count, 3))
     for k in range(count):
         impact = draw(rng, approaching=signs == "all approach")
         e = rng.choice([0.0, 0.2, 0.7, 1.0], size=impact.contacts)
-        ours, problem = (
-            resolve_impact(*impact.arrays, e),
-            ImpactProblem.from_impact(*impact.arrays, e),
-        )
+        ours = resolve_impact(*impact.arrays, e)
+        problem = ImpactProblem.from_impact(*impact.arrays, e)
         if len(set(e)) > 1:
             distances.append(_distance(impact, ours.velocity, poisson(problem).velocity))
         gains[k] = [

@@ -74,7 +74,8 @@ def _approaching(rows: Floats, velocity: Floats) -> Floats:
 def _one_contact(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Floats, Floats]:
     """A single contact, also given several times."""
     d = int(rng.integers(1, 13))
-    velocity, row = rng.normal(size=d), rng.normal(size=(1, d))
+    velocity = rng.normal(size=d)
+    row = rng.normal(size=(1, d))
     row = _approaching(row, velocity)
     sizes = (1.0, *rng.uniform(0.5, 2.0, redundancy))
     return random_mass_matrix(rng, d), np.vstack([row * size for size in sizes]), velocity
@@ -90,7 +91,8 @@ def _cradle(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Floats, 
 
 def _obtuse(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Floats, Floats]:
     """Rows with cosines <= 0 in the kinetic metric, so that none of IAPB's impulses pulls."""
-    d, c = int(rng.integers(3, 9)), int(rng.integers(2, 4))
+    d = int(rng.integers(3, 9))
+    c = int(rng.integers(2, 4))
     gram = np.eye(c) - rng.uniform(0.0, 0.9 / (c - 1), size=(c, c)) * (1.0 - np.eye(c))
     frame = np.linalg.qr(rng.normal(size=(d, d)))[0]
     rows = np.linalg.cholesky(np.minimum(gram, gram.T)) @ frame[:c]
@@ -102,7 +104,8 @@ def _obtuse(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Floats, 
 
 def _face_on_floor(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Floats, Floats]:
     """A planar box lands with some rotation on 2 + redundancy points of its lower face."""
-    m, half = np.exp(rng.normal()), rng.uniform(0.2, 2.0)
+    m = np.exp(rng.normal())
+    half = rng.uniform(0.2, 2.0)
     inertia = m * (half**2 + rng.uniform(0.1, 1.0) ** 2) / 3.0
     points = np.sort(rng.uniform(-half, half, 2 + redundancy))
     rows = np.column_stack([np.zeros_like(points), np.ones_like(points), points])
@@ -121,7 +124,9 @@ def _corner(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Floats, 
 
 def _hole(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Floats, Floats]:
     """A peg in a hole with a taper of 1:100: its end and both sides approach the hole at once."""
-    length, width, slope = rng.uniform(0.5, 3.0), 1.0, 0.01
+    length = rng.uniform(0.5, 3.0)
+    width = 1.0
+    slope = 0.01
     n = np.array([slope, 1.0]) / np.hypot(slope, 1.0)
     points = [((x, -length), (0.0, 1.0)) for x in (-width, width)]
     for y in np.linspace(-length, length, 1 + redundancy):
@@ -136,7 +141,8 @@ def _random_rows(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Flo
     """Random rows and a random mass matrix; the redundant rows are sums of the others with positive
     weights."""
     d = int(rng.integers(3, 13))
-    independent, velocity = rng.normal(size=(int(rng.integers(2, d)), d)), rng.normal(size=d)
+    independent = rng.normal(size=(int(rng.integers(2, d)), d))
+    velocity = rng.normal(size=d)
     independent = _approaching(independent, velocity)
     more = rng.uniform(0.0, 1.0, size=(redundancy, len(independent))) @ independent
     return random_mass_matrix(rng, d), np.vstack([independent, more]), velocity

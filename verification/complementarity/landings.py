@@ -14,7 +14,8 @@ from iapb import resolve_impact
 from verification.check import Check, Study
 from verification.table import Row
 
-MASS, HALF_LENGTH = 1.0, 1.0
+MASS = 1.0
+HALF_LENGTH = 1.0
 INERTIA = MASS * HALF_LENGTH**2 / 3.0
 SPEED_RATIO = 0.25  # r
 COSINES = {"A": -0.3, "B": 0.75}
@@ -29,7 +30,8 @@ def post_of(cosine: float) -> float:
 
 def cosine_of(distance: float, mass: float, inertia: float) -> float:
     """Return the cosine of two contacts on a face, each at this distance from the centre's foot."""
-    push, turn = 1.0 / mass, distance**2 / inertia
+    push = 1.0 / mass
+    turn = distance**2 / inertia
     return (push - turn) / (push + turn)
 
 

@@ -47,16 +47,19 @@ def impacts_of_run(run: Run, scene: Scene) -> tuple[tuple[ImpactCase, ...], int]
         A rebuilt impact does not give the velocity that the run recorded, so the run is not a run
         of this scene.
     """
-    mechanism, approach = mechanism_of(scene), scene.contact.approach_velocity
+    mechanism = mechanism_of(scene)
+    approach = scene.contact.approach_velocity
     values = restitutions_of(scene, pairs_of(scene, shapes_of(scene)))
     rubbing = bool(run.law_settings.get("friction_in_impacts")) and scene.largest_friction > 0.0
     other_law = scene.contact.self_collision_rows == "per_body" or len(values) != 1 or rubbing
-    cases, left_out = [], 0
+    cases = []
+    left_out = 0
     for blow in _group_impacts(run, mechanism):
         if other_law or blow.scaled or blow.several:
             left_out += 1
             continue
-        rows, v = _rows_of_step(run, mechanism, blow), blow.v_minus
+        rows = _rows_of_step(run, mechanism, blow)
+        v = blow.v_minus
         closing = rows @ v < -approach
         case = ImpactCase(
             mechanism.mass_matrix(blow.q),
@@ -103,14 +106,17 @@ RUBBING = "friction (contact.forces: paper leaves it out of impacts)"
 def problems_of_run(run: Run, scene: Scene) -> list[StruckImpact]:
     """Return all impacts of an IAPB run as problems, with each contact's own restitution and
     friction."""
-    system, approach = System(scene), scene.contact.approach_velocity
-    mechanism, found = system.mechanism, list[StruckImpact]()
+    system = System(scene)
+    approach = scene.contact.approach_velocity
+    mechanism = system.mechanism
+    found = list[StruckImpact]()
     rubbing = bool(run.law_settings.get("friction_in_impacts"))
     per_body = scene.contact.self_collision_rows == "per_body"
     for number, blow in enumerate(_group_impacts(run, mechanism), 1):
         if blow.several:
             continue
-        v, mass = blow.v_minus, mechanism.mass_matrix(blow.q)
+        v = blow.v_minus
+        mass = mechanism.mass_matrix(blow.q)
         rows = _rows_of_step(run, mechanism, blow)
         closing = rows @ v < -approach
         if not closing.any():
@@ -145,7 +151,8 @@ def _coefficients(
     A run records the bodies of a contact, not its shapes: they are those of the nearest contact of
     these bodies that the geometry gives. A joint's stop has none.
     """
-    there, table = system.contacts_at(q, TOUCHING), run.contacts
+    there = system.contacts_at(q, TOUCHING)
+    table = run.contacts
     e = np.full(len(contacts), system.scene.contact.restitution)
     mu = np.zeros(len(contacts))
     for k, m in enumerate(contacts):
@@ -155,7 +162,8 @@ def _coefficients(
         away = np.linalg.norm(there.point - table.point[m], axis=1)
         nearest = np.argmin(np.where(same, away, np.inf))
         pair = np.array([[there.shape_a[nearest], there.shape_b[nearest]]])
-        e[k], mu[k] = restitution_by_pair(system.scene, pair)[0], system.frictions.by_pair(pair)[0]
+        e[k] = restitution_by_pair(system.scene, pair)[0]
+        mu[k] = system.frictions.by_pair(pair)[0]
     return e, mu
 
 
@@ -185,7 +193,8 @@ class _GroupImpact(NamedTuple):
 
 def _group_impacts(run: Run, mechanism: Mechanism) -> list[_GroupImpact]:
     """Join the islands of each contact group."""
-    found, table = [], run.impacts
+    found = []
+    table = run.impacts
     for step in np.unique(table.step).tolist():
         of_step = np.flatnonzero(table.step == step)
         touching = range(int(run.contacts.offsets[step]), int(run.contacts.offsets[step + 1]))
@@ -200,7 +209,8 @@ def _group_impacts(run: Run, mechanism: Mechanism) -> list[_GroupImpact]:
                 m for m in touching if mechanism.tree_of_body[run.contacts.body_a[m]] in trees
             ]
             lines = [int(k) for k in of_step if groups[k] == trees]
-            before, after = table.v_minus[lines[0]], table.v_plus[lines[-1]]
+            before = table.v_minus[lines[0]]
+            after = table.v_plus[lines[-1]]
             found.append(
                 _GroupImpact(
                     step,
@@ -218,7 +228,8 @@ def _group_impacts(run: Run, mechanism: Mechanism) -> list[_GroupImpact]:
 def _trees_of_group(run: Run, mechanism: Mechanism, touching: range, group: int) -> frozenset[int]:
     """Return the trees that contacts between moving bodies link to the tree `group` (paper, section
     III)."""
-    table, trees = run.contacts, {group}
+    table = run.contacts
+    trees = {group}
     links = [
         {int(mechanism.tree_of_body[table.body_a[m]]), int(mechanism.tree_of_body[table.body_b[m]])}
         for m in touching
@@ -234,7 +245,8 @@ def _rows_of_step(
 ) -> Floats:
     """Return the rows nᵀ(J_a − J_b) (k, d) of the group's contacts, or the rows along other
     directions (k, 3)."""
-    table, q = run.contacts, blow.q
+    table = run.contacts
+    q = blow.q
     rows = np.zeros((len(blow.contacts), mechanism.nv))
     for i, m in enumerate(blow.contacts):
         along = table.normal[m] if directions is None else directions[i]

@@ -38,13 +38,15 @@ def sphere_pile(spheres: int, kept: float, rng: np.random.Generator) -> ImpactCa
     cells = np.array([(i, j, k) for k in range(side) for j in range(side) for i in range(side)])[
         :spheres
     ]
-    places, rows = cells @ _LATTICE, []
+    places = cells @ _LATTICE
+    rows = []
     for a in range(spheres):
         for b in range(a):
             apart = places[a] - places[b]
             if np.linalg.norm(apart) < 1.0 + 1e-9 and rng.random() < kept:
                 row = np.zeros((spheres, 3))
-                row[a], row[b] = apart, -apart
+                row[a] = apart
+                row[b] = -apart
                 rows.append(row.ravel())
         if cells[a, 2] == 0:
             floor = np.zeros((spheres, 3))
@@ -77,7 +79,10 @@ def sphere_piles(depth: str) -> Iterator[ImpactCase]:
 
 def _row(study: Study, spheres: int) -> Row:
     """Resolve the piles of one size by (21), by impulses that only push, and by complementarity."""
-    contacts, agreeing, pulls, pushed = [], [0], [], []
+    contacts = []
+    agreeing = [0]
+    pulls = []
+    pushed = []
     for case in piles_of(study.depth, spheres):
         given = (*case.arrays, 0.0)
         equal = resolve_impact(*given)

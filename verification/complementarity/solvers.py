@@ -67,15 +67,11 @@ def study_read(
 ) -> ProblemStudy:
     """Solve every problem of a collection called `name`; `unread` has the reason for each file that
     cannot be read."""
-    pairs, say = (
-        sum(len(solver_names(stored.problem)) for stored in problems),
-        progress or (lambda *_: None),
-    )
-    stage, begun, slow = (
-        f"problems of {name}, by every solver",
-        itertools.count(),
-        dict[str, float](),
-    )
+    pairs = sum(len(solver_names(stored.problem)) for stored in problems)
+    say = progress or (lambda *_: None)
+    stage = f"problems of {name}, by every solver"
+    begun = itertools.count()
+    slow = dict[str, float]()
     say(stage, 0, pairs)
     rows: list[SolverRow] = []
     with one_thread():
@@ -124,7 +120,9 @@ def _line(stored: StoredProblem, rows: list[SolverRow], solvers: Mapping[str, An
     """Return the row of a problem: its size, the verdict on each solver, the spread of the contact
     velocities among those that solved it, and the recomputed residual of the multipliers that the
     file has."""
-    problem, verdicts, residual = stored.problem, {row.solver: row.verdict for row in rows}, None
+    problem = stored.problem
+    verdicts = {row.solver: row.verdict for row in rows}
+    residual = None
     if stored.stored_impulse is not None and problem.size:
         residual = Solution(problem, stored.stored_impulse, "stored in the file").residuals.worst
     rank = (
@@ -150,7 +148,8 @@ def on_problems(study: Study, name: str, folder: Path | None) -> ProblemStudy:
     """Return the study of every problem file below a folder, or of our own problems, made once."""
 
     def make() -> ProblemStudy:
-        read, unread = list[StoredProblem](), dict[str, str]()
+        read = list[StoredProblem]()
+        unread = dict[str, str]()
         for path in problem_files(folder) if folder is not None else ():
             try:
                 read.append(read_problem(path))

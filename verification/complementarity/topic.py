@@ -20,9 +20,13 @@ from verification.table import Table
 
 def _numbers(tables: Mapping[str, Table]) -> Values:
     """Return what the page quotes."""
-    found, grid, landings = tables[MAP.key], tables[TWO_CONTACTS.key], tables[LANDINGS.key]
-    scenes, piles = found.where(kind=SCENE), tables[PILES.key]
-    solvers, pinocchio = tables[SOLVER_TABLE.key], tables[AGAINST_PINOCCHIO.key]
+    found = tables[MAP.key]
+    grid = tables[TWO_CONTACTS.key]
+    landings = tables[LANDINGS.key]
+    scenes = found.where(kind=SCENE)
+    piles = tables[PILES.key]
+    solvers = tables[SOLVER_TABLE.key]
+    pinocchio = tables[AGAINST_PINOCCHIO.key]
     return {
         "impacts": sum(found["cases"]),
         "agree": sum(found["agree"]),

@@ -31,9 +31,13 @@ from verification.finding import Failure, Part, attempt, counted
 from verification.impacts import TIMED_HARDNESS, Floats, ImpactCase, timed_problems
 from verification.table import Row, Table, table_from
 
-COMPILED, PYTHON = "compiled", "from Python"
-IAPB, SWEEPS, LEMKE = "IAPB", "Gauss-Seidel", "Lemke"
-CALLED, QP = "IAPB from Python", "DAQP from Python"
+COMPILED = "compiled"
+PYTHON = "from Python"
+IAPB = "IAPB"
+SWEEPS = "Gauss-Seidel"
+LEMKE = "Lemke"
+CALLED = "IAPB from Python"
+QP = "DAQP from Python"
 
 
 @dataclass(frozen=True)
@@ -48,7 +52,8 @@ class Way:
     rows: int = 0
 
 
-ROWS, REPEATED = (1, 2, 4, 8, 16), (1, 4, 16, 64, 256, 1024)
+ROWS = (1, 2, 4, 8, 16)
+REPEATED = (1, 4, 16, 64, 256, 1024)
 # To add a method, add a line here.
 WAYS: tuple[Way, ...] = (
     *(
@@ -126,7 +131,8 @@ def work_precision(
         "ok", "too slow" (more than LONGEST), or "failed" with its reason; a failed row has only the
         time until the method gave up.
     """
-    study, cases = Study(failures=failures), _hard(sizes)
+    study = Study(failures=failures)
+    cases = _hard(sizes)
     each = counted(cases, progress) if progress else cases
     return ACCURACY.table_of(study.each(each, partial(_measured, ways, rounds, study)))
 
@@ -437,7 +443,8 @@ def numbers_of(best: Table) -> Row:
     ours = [row for row in rows if row[f"method, {COMPILED}"] == IAPB]
     if not ours:
         return {"sizes": len(rows), "sizes_iapb": 0}
-    first, last = ours[0], ours[-1]
+    first = ours[0]
+    last = ours[-1]
     return {
         "sizes": len(rows),
         "sizes_iapb": len(ours),
@@ -468,7 +475,9 @@ def stopped(study: Study, case: Stopped) -> Row:
         random_impact(d, c, np.random.default_rng([0, d, c, k]), 0.0)
         for k in range(40 if study.depth == "full" else 15)
     ]
-    residuals, gains, lost = [], [], []
+    residuals = []
+    gains = []
+    lost = []
     for one in impacts:
         mass, rows, v = one.arrays
         v_plus = resolve_impact(mass, rows, v, 0.0, budget=budget).velocity

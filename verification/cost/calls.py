@@ -63,7 +63,9 @@ def kernel_call(case: ImpactCase, budget: int | None = None) -> KernelCall:
     rows."""
     mass, rows, v = map(np.ascontiguousarray, case.arrays)
     c, d = rows.shape
-    work, v_plus, clamps = block(zeros_of(ImpactWork, velocity=d, row=c)), np.zeros(d), np.zeros(1)
+    work = block(zeros_of(ImpactWork, velocity=d, row=c))
+    v_plus = np.zeros(d)
+    clamps = np.zeros(1)
     most = d if budget is None else budget
     given = mass[None], rows.T[None].copy(), v[None], np.array([case.restitution]), most, True
 
@@ -78,7 +80,8 @@ def sweeps_call(case: ImpactCase, sweeps: int) -> KernelCall:
     mass, rows, v = map(np.ascontiguousarray, case.arrays)
     c, d = rows.shape
     given = mass, np.zeros((d, d)), v, case.restitution, rows, sweeps
-    scratch, v_plus = (np.zeros((c, d)), np.zeros(c), np.zeros(c), np.zeros(c)), np.zeros(d)
+    scratch = (np.zeros((c, d)), np.zeros(c), np.zeros(c), np.zeros(c))
+    v_plus = np.zeros(d)
     return KernelCall(partial(kernels().repeat_sweeps, *given, *scratch, v_plus), v_plus)
 
 
@@ -116,7 +119,9 @@ def daqp_call(case: ImpactCase) -> Call:
         raise MissingDependencyError("daqp", "DAQP", installing("reference")) from error
     mass, rows, v = map(np.ascontiguousarray, case.arrays)
     c, d = rows.shape
-    lower, unit, least = np.zeros((d, d)), np.zeros((c, d)), np.zeros(c)
+    lower = np.zeros((d, d))
+    unit = np.zeros((c, d))
+    least = np.zeros(c)
     compiled = kernels()
     form = np.eye(d), np.zeros(d), unit, np.full(c, 1e30), least, np.zeros(c, np.int32)
 

@@ -82,14 +82,18 @@ SWITCHED = tuple(
     name for name in engine.Switches._fields if name in EFFECT_NAMES and name not in _OWN_ARRAYS
 )
 # What happens without an effect: the same states to the last bit, another motion, or no run at all.
-SAME, MOVES, STOPS = "same bits", "another motion", "no run"
+SAME = "same bits"
+MOVES = "another motion"
+STOPS = "no run"
 
 
 def effects_of_scenes(
     progress: Callable[[int, int], None] | None = None, failures: list[Failure] | None = None
 ) -> dict[str, Table]:
     """Return the effects of each shipped scene in the IAPB world, and under STEPS their times."""
-    names, found, rows = scene_names(), dict[str, Table](), list[Row]()
+    names = scene_names()
+    found = dict[str, Table]()
+    rows = list[Row]()
     for name in counted(names, progress) if progress else names:
         measured = attempt(name, partial(_of_shipped, name, failures), failures)
         if measured is not None:
@@ -195,7 +199,8 @@ def step_of(scene: Scene, world: str = "IAPB", rounds: int = ROUNDS) -> Row:
     """
     chosen = find_world(world)
     effects = decide_effects(scene, chosen.law, chosen.coupling_in(scene))
-    needed, again = Loop(scene, chosen), Loop(scene, chosen)
+    needed = Loop(scene, chosen)
+    again = Loop(scene, chosen)
     every = Loop(scene, chosen, switches=SWITCHED, on=True)
     loops = {"needed": needed, "again": again, "every": every}
     if needed.sample() * needed.steps > SLOW:
@@ -321,12 +326,11 @@ class Loop(RecordedLoop):
         axes. The body's origin is not enough, because the origin of a hinged body lies in the hinge
         and never moves.
         """
-        held, mechanism, found = (
-            self.simulation.port.hand_body,
-            self.simulation.system.mechanism,
-            [],
-        )
-        bodies, states = slice(None) if held < 0 else slice(held, held + 1), self.states("q")
+        held = self.simulation.port.hand_body
+        mechanism = self.simulation.system.mechanism
+        found = []
+        bodies = slice(None) if held < 0 else slice(held, held + 1)
+        states = self.states("q")
         for q in states:
             for body, R, p in zip(
                 *(each[bodies] for each in (mechanism.bodies, *mechanism.placements(q))),
@@ -351,10 +355,8 @@ class Loop(RecordedLoop):
 
     def kinetic(self) -> Floats:
         """Return the kinetic energy at the compared instants (n,) [J]."""
-        states, energy = (
-            zip(self.states("q"), self.states("v"), strict=True),
-            self.simulation.system.mechanism,
-        )
+        states = zip(self.states("q"), self.states("v"), strict=True)
+        energy = self.simulation.system.mechanism
         return np.array([energy.kinetic_energy(q, v) for q, v in states])
 
 
@@ -362,8 +364,10 @@ def _leave_out_pairs(simulation: Any, kind: str) -> None:
     """Remove the pairs of shapes with a wall (`kind` "wall"), or the pairs of two trees
     ("body")."""
     system = simulation.system
-    bodies, tree = system.shapes.body, system.mechanism.tree_of_body
-    a, b = bodies[system.pairs[:, 0]], bodies[system.pairs[:, 1]]
+    bodies = system.shapes.body
+    tree = system.mechanism.tree_of_body
+    a = bodies[system.pairs[:, 0]]
+    b = bodies[system.pairs[:, 1]]
     walls = b < 0
     gone = walls if kind == "wall" else ~walls & (tree[a] != tree[np.maximum(b, 0)])
     system.pairs = np.ascontiguousarray(system.pairs[~gone])

@@ -38,15 +38,15 @@ def steepest(sizes: Sequence[float], values: Sequence[float]) -> tuple[float, fl
     return low, high, slope
 
 
-PAPER_STEP, MILLISECOND = "1/512 s, the paper's step", "1 ms"
+PAPER_STEP = "1/512 s, the paper's step"
+MILLISECOND = "1 ms"
 DEADLINES = {
     PAPER_STEP: 1.0 / 512.0,
     MILLISECOND: 1e-3,
 }  # [s] one step at the paper's haptic rate and at 1 kHz
-CALLS, ALLOWED = (
-    1000,
-    1,
-)  # calls of one trial, and the number of late calls allowed: 99.9 % are in time
+# calls of one trial, and the number of late calls allowed: 99.9 % are in time
+CALLS = 1000
+ALLOWED = 1
 _ATTEMPTS = (
     3  # largest number of attempts of a trial, because other processes can only make calls slower
 )
@@ -106,7 +106,8 @@ def call_times(
     sample = sampler(call)
     typical = float(np.median([sample() for _ in range(LEAST_ROUNDS)]))
     for _ in range(_ATTEMPTS):
-        late, times = 0, list[float]()
+        late = 0
+        times = list[float]()
         while len(times) < calls and late <= ALLOWED:
             times.append(seconds(call))
             late += times[-1] > deadline

@@ -40,7 +40,8 @@ SOLVERS = ("daqp", "quadprog", "lemke", "gauss_seidel", "proxqp", "cvxpy_clarabe
 # Where the arrays of an impact lie in memory changes its ratio by up to 40 %, so each compiled size
 # has several draws, each in arrays of its own. Their median then moves by up to 12 % between
 # processes on a busy machine (once by 19 %).
-DRAWS, ROUNDS = 4, {"quick": LEAST_ROUNDS, "full": 7}
+DRAWS = 4
+ROUNDS = {"quick": LEAST_ROUNDS, "full": 7}
 LONGEST = {
     "quick": 0.4,
     "full": 60.0,
@@ -49,7 +50,8 @@ LONGEST = {
 # solvers reach 1e-6.
 SOLVED = 1e-5
 CLEAR = 1.1  # a clear difference: a quartile of the ratio is beyond this factor
-STEPS, RIGID = "whole steps", "rigid wall"
+STEPS = "whole steps"
+RIGID = "rigid wall"
 OF_STEPS = ("IAPB, slowest [µs]", "solver alone [µs]")
 MEASURED = ("time [µs]", "IAPB [µs]", "ratio", "lower quartile", "upper quartile")
 
@@ -123,7 +125,8 @@ def _made(study: Study, size: Size, case: ImpactCase) -> tuple[dict[str, Call], 
         makers = {IAPB: calls.engine_call, PRINTED: calls.printed_call, DAQP: calls.daqp_call}
         makers |= {name: partial(calls.solver_call, name=name) for name in SOLVERS}
     slow: set[tuple[str, str]] = study.once("too slow", set)
-    made, answers = dict[str, Call](), dict[str, Any]()
+    made = dict[str, Call]()
+    answers = dict[str, Any]()
 
     def tried(name: str) -> None:
         try:
@@ -186,7 +189,8 @@ def _steps(study: Study, name: str) -> Iterator[Row]:
         ours = [our_loop.sample() for _ in range(LEAST_ROUNDS + 1)][1:]
     except IapbError:  # the rigid world stops: two laws of restitution, or too many contacts
         return
-    alone, median = clock.seconds / (RIGID_RUNS * steps), float(np.median(ours))
+    alone = clock.seconds / (RIGID_RUNS * steps)
+    median = float(np.median(ours))
     yield {
         "impacts": STEPS,
         "method": RIGID,

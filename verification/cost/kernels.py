@@ -22,11 +22,14 @@ def repeat_lemke(mass_matrix, rows, v, restitution, v_plus, times):
     """Resolve the impact of v on rows (c, d) `times` times; write v⁺ (d,), NaN if Lemke's method
     fails."""
     c, d = rows.shape
-    lower, whitened = np.zeros((d, d)), np.zeros((c, d))
-    delassus, offset = np.zeros((c, c)), np.zeros(c)
+    lower = np.zeros((d, d))
+    whitened = np.zeros((c, d))
+    delassus = np.zeros((c, c))
+    offset = np.zeros(c)
     for _ in range(times):
         cholesky(mass_matrix, lower)
-        inertia, speed = 0.0, 0.0
+        inertia = 0.0
+        speed = 0.0
         for i in range(c):
             for k in range(d):  # A = J L⁻ᵀ, row by row
                 rest = rows[i, k]
@@ -36,7 +39,8 @@ def repeat_lemke(mass_matrix, rows, v, restitution, v_plus, times):
             for j in range(i + 1):
                 delassus[i, j] = delassus[j, i] = np.dot(whitened[i], whitened[j])
             offset[i] = (1.0 + restitution) * np.dot(rows[i], v)
-            inertia, speed = max(inertia, delassus[i, i]), max(speed, abs(offset[i]))
+            inertia = max(inertia, delassus[i, i])
+            speed = max(speed, abs(offset[i]))
         result = lcp_lemke(delassus / inertia, offset / speed)
         v_plus[:] = 0.0
         for i in range(c):

@@ -16,7 +16,8 @@ _AGREE = 1e-9
 def random_impact(d: int, c: int, rng: np.random.Generator, restitution: float = 0.5) -> ImpactCase:
     """Return a random impact with c rows, whose rank is two thirds of d (or c, if this is less)."""
     rank = max(1, (2 * d) // 3)
-    root, rows = rng.normal(size=(d, d)), rng.normal(size=(c, rank)) @ rng.normal(size=(rank, d))
+    root = rng.normal(size=(d, d))
+    rows = rng.normal(size=(c, rank)) @ rng.normal(size=(rank, d))
     return ImpactCase(root @ root.T + np.eye(d), rows, rng.normal(size=d), restitution, rank=rank)
 
 
@@ -51,7 +52,8 @@ def pile(contacts: int, rng: np.random.Generator) -> ImpactCase:
     boxes = (contacts + 1) // 2
     rows = np.zeros((contacts, 3 * boxes))
     for i in range(contacts):
-        box, arm = i // 2, 1.0 if i % 2 else -1.0
+        box = i // 2
+        arm = 1.0 if i % 2 else -1.0
         rows[i, 3 * box + 1 : 3 * box + 3] = 1.0, arm
         if box > 0:
             rows[i, 3 * box - 2 : 3 * box] = -1.0, -arm

@@ -22,7 +22,8 @@ from verification.table import Row
 
 STATES = 200  # random states, one call each, in one round
 ROUNDS = {"quick": 25, "full": 200}
-ONE, MANY = "one state per call", f"{STATES} states in one call"
+ONE = "one state per call"
+MANY = f"{STATES} states in one call"
 LIMITS = {ONE: 3.0, MANY: 1.0}  # target of the ratio
 OTHERS = robot_files()
 FILES = {path.stem: path for path in OTHERS or sorted((SHIPPED / "robots").glob("*.urdf"))}
@@ -30,7 +31,8 @@ FILES = {path.stem: path for path in OTHERS or sorted((SHIPPED / "robots").glob(
 
 def time_robot(study: Study, name: str) -> Iterator[Row]:
     """Yield the times of both quantities in both forms for one robot."""
-    mechanism, rng = Mechanism.from_urdf(FILES[name]), np.random.default_rng(SEED)
+    mechanism = Mechanism.from_urdf(FILES[name])
+    rng = np.random.default_rng(SEED)
     states = [random_state(rng, mechanism) for _ in range(STATES)]
     qs, vs = (np.array(rows) for rows in zip(*states, strict=True))
     their_mass, their_bias = calls_from_urdf(FILES[name])

@@ -40,14 +40,17 @@ class RecordedLoop:
     """
 
     def __init__(self, simulation: Any, steps: int) -> None:
-        self.simulation, self.steps = simulation, steps
+        self.simulation = simulation
+        self.steps = steps
         self.recording: Recorder
 
     def sample(self) -> float:
         """Return the time per step of one whole run [s]; raise the error that stops the run before
         its end."""
-        simulation, system = self.simulation, self.simulation.system
-        simulation.state, simulation.steps_done = system.make_state(), 0
+        simulation = self.simulation
+        system = self.simulation.system
+        simulation.state = system.make_state()
+        simulation.steps_done = 0
         simulation.port = system.make_port(simulation.coupling)
         self.recording = Recorder(simulation)
         total = 0.0
@@ -60,16 +63,16 @@ class RecordedLoop:
 
 
 def _record(simulation: Any, steps: int) -> Any:
-    system, coordinates = simulation.system, Recorder(simulation).coordinates
+    system = simulation.system
+    coordinates = Recorder(simulation).coordinates
     return make_record(steps, coordinates, system.capacity, len(system.mechanism.tree_dofs))
 
 
 # Against MuJoCo
 
-STEPS, ROUNDS = (
-    512,
-    {"quick": 9, "full": 20},
-)  # steps of one sample, as in a chunk of `simulate`; samples of each loop
+# steps of one sample, as in a chunk of `simulate`; samples of each loop
+STEPS = 512
+ROUNDS = {"quick": 9, "full": 20}
 SOLVERS = ("Newton", "CG", "PGS")
 TARGETS = {"peg in the corner": 0.1}
 SPATIAL_TARGET = 0.5
@@ -114,16 +117,15 @@ class OwnLoop:
     """The scene in our loop; every sample starts again and settles before the timed steps."""
 
     def __init__(self, scene: RestingScene, steps: int) -> None:
-        self.simulation, self.settling, self.steps = (
-            Simulation(scene.scene()),
-            scene.settling,
-            steps,
-        )
+        self.simulation = Simulation(scene.scene())
+        self.settling = scene.settling
+        self.steps = steps
         self.contacts = self.moved = 0.0
 
     def sample(self) -> float:
         """Return the time per step [s]."""
-        simulation, record = self.simulation, self._settled()
+        simulation = self.simulation
+        record = self._settled()
         before = simulation.state.q.copy()
         _, spent = timed(lambda: simulation.advance_chunk(record, self.steps))
         self.contacts = float(record.steps.contact_count.mean())
@@ -133,7 +135,8 @@ class OwnLoop:
     def _settled(self) -> Any:
         """Start from the first state, simulate until the scene is at rest, and return an empty
         record."""
-        simulation, system = self.simulation, self.simulation.system
+        simulation = self.simulation
+        system = self.simulation.system
         simulation.state, simulation.port = (
             system.make_state(),
             system.make_port(simulation.coupling),
@@ -148,7 +151,9 @@ class TheirLoop:
     def __init__(self, resting: RestingScene, solver: str, steps: int) -> None:
         import mujoco
 
-        self.resting, self.scene, self.steps = resting, resting.scene(), steps
+        self.resting = resting
+        self.scene = resting.scene()
+        self.steps = steps
         self.engine = MuJoCo()
         self.model = self.engine.model(self.scene)
         self.model.opt.solver = getattr(mujoco.mjtSolver, f"mjSOL_{solver.upper()}")
@@ -162,7 +167,8 @@ class TheirLoop:
         set_state(joint_places(self.scene, self.model), data, *start_of(self.scene))
         self.engine.step(self.scene, self.model, data, 0.0)
         mujoco.mj_step(self.model, data, self.resting.settling)
-        before, touching = data.qpos.copy(), data.ncon
+        before = data.qpos.copy()
+        touching = data.ncon
         _, spent = timed(lambda: mujoco.mj_step(self.model, data, self.steps))
         self.contacts = 0.5 * (touching + data.ncon)
         self.moved = float(np.abs(data.qpos - before).max())
@@ -190,18 +196,20 @@ RACES = Check(
 
 COUNTS = (1, 2, 5, 10, 20, 50, 100, 200)
 LEAST_BODIES = 20  # with fewer, overhead hides the growth
-RADIUS, PITCH = 0.02, 0.046  # [m]: discs on a square grid with 6 mm between them
-CHUNKS, CHUNK_STEPS, REPEATS = (
-    50,
-    10,
-    3,
-)  # short chunks, so that each chunk has an undisturbed repeat
+# [m]: discs on a square grid with 6 mm between them
+RADIUS = 0.02
+PITCH = 0.046
+# short chunks, so that each chunk has an undisturbed repeat
+CHUNKS = 50
+CHUNK_STEPS = 10
+REPEATS = 3
 LARGEST_POWER = 1.2  # target
 
 
 def field_of_discs(n: int) -> str:
     """Return the YAML text of a scene of n discs with random velocities over a wall."""
-    rng, columns = np.random.default_rng(0), math.ceil(math.sqrt(n))
+    rng = np.random.default_rng(0)
+    columns = math.ceil(math.sqrt(n))
     bodies = [
         f"  - {{name: disc_{k}, joint: planar, mass: 0.1, inertia: 2e-5, "
         f"shapes: [{{kind: circle, radius: {RADIUS}}}], "
@@ -232,7 +240,8 @@ def step_of_bodies(study: Study, n: int) -> Row:
     quickest = [math.inf] * CHUNKS
     for _ in range(REPEATS):
         simulation.state = simulation.system.make_state()
-        contacts, tested = 0.0, 0.0
+        contacts = 0.0
+        tested = 0.0
         for k in range(CHUNKS):
             record = _record(simulation, CHUNK_STEPS)
             _, spent = timed(partial(simulation.advance_chunk, record, CHUNK_STEPS))
@@ -251,7 +260,8 @@ def step_of_bodies(study: Study, n: int) -> Row:
 def _tested(simulation: Simulation) -> int:
     """Return the number of pairs that the narrow phase tests at the current positions of the
     bodies."""
-    world, body = simulation.world, simulation.state.body
+    world = simulation.world
+    body = simulation.state.body
     if not world.broad_phase.used:
         return len(world.pairs)
     return int(near_pairs(world.broad_phase, body.rotation, body.position, 0.0))

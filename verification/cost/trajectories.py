@@ -60,7 +60,9 @@ SAMPLES = 1000.0  # [1/s] of a motion that are compared with the truth
 REPEATS = 5  # number of repetitions of runs below ONCE seconds
 ONCE = 0.05
 LONGEST = {"quick": 2.0, "full": 20.0}  # [s] largest time of one run
-OK, FAILED, TIMED_OUT = "ok", "failed", "timed out"
+OK = "ok"
+FAILED = "failed"
+TIMED_OUT = "timed out"
 
 # A world: it simulates a scene and returns the run with its computing time [s], without the set-up.
 World = Callable[[Scene], tuple[Run, float]]
@@ -102,7 +104,8 @@ def motions_of(study: Study, name: str) -> Iterator[Row]:
 # before it
 GAINED = 1.5
 # a power is fitted to no fewer runs and no smaller fall of the error: no extrapolation
-FIT_RUNS, FIT_FALL = 3, 10.0
+FIT_RUNS = 3
+FIT_FALL = 10.0
 
 
 def by_chance(run: Row) -> bool:
@@ -152,7 +155,9 @@ def worth(motions: Table, method: str) -> Row:
     of a scene if no run of another world has a smaller one.
     """
     scenes = dict.fromkeys(motions.column("scene"))
-    costs, least, first = list[float](), list[float](), 0
+    costs = list[float]()
+    least = list[float]()
+    first = 0
     for scene in scenes:
         mine = runs_of(motions, scene=scene, method=method)
         if not mine:
@@ -218,7 +223,8 @@ def stiffened(scene: Scene) -> Scene:
     A collision of the lightest body at one contact takes eight steps. Where n contacts share a
     collision, the walls are n times too stiff and the restitution is too small.
     """
-    mass, e = min(body.mass for body in scene.bodies), scene.contact.restitution
+    mass = min(body.mass for body in scene.bodies)
+    e = scene.contact.restitution
     frequency = pi / (8.0 * scene.step)
     damping = 1.0 if e < LOWEST else -log(e) / hypot(pi, log(e))
     return scene.with_values(
@@ -248,7 +254,9 @@ def _mujoco(scene: Scene) -> tuple[Run, float]:
     return run, float(run.chunk_seconds.sum())
 
 
-STIFF_IAPB, STIFF_PB, MUJOCO = "IAPB, stiff springs", "PB, stiff springs", "MuJoCo"
+STIFF_IAPB = "IAPB, stiff springs"
+STIFF_PB = "PB, stiff springs"
+MUJOCO = "MuJoCo"
 OURS = ("IAPB", STIFF_IAPB)
 COMPILED = (*OURS, STIFF_PB)
 # To add a world, add a line here.
@@ -317,7 +325,8 @@ class Judge:
         q, v = self.truth.state(np.linspace(0.0, scene.duration, 1001))
         self.kinetic = float(self.mechanism.energies(q, v, self.gravity)[0].max())
         self.start = float(self._energy(q, v)[0])
-        bound, mass = self.truth.bound, sum(body.mass for body in scene.bodies)
+        bound = self.truth.bound
+        mass = sum(body.mass for body in scene.bodies)
         speed = float(np.linalg.norm(v.reshape(len(v), -1, 6)[..., :3], axis=-1).max())
         energy = mass * (
             speed * bound.velocity + float(np.linalg.norm(self.gravity)) * bound.position

@@ -28,7 +28,9 @@ NEWTON_COULOMB = (
 COULOMB = "ideal with friction"
 RESTITUTION_TOLERANCE = 1e-8  # the tolerance of the kit for all resolvers
 NO_GAIN = 1e-12  # rounding of the sums of energies over the run's steps
-STABLE, DEPENDS_ON_ROUNDING, NOT_TRIED = "stable", "depends on rounding", "not tried"
+STABLE = "stable"
+DEPENDS_ON_ROUNDING = "depends on rounding"
+NOT_TRIED = "not tried"
 
 
 @dataclass(frozen=True)
@@ -101,7 +103,8 @@ class HardCase:
     def exact_outcome(self) -> tuple[tuple[Fraction, ...], int]:
         """Return v⁺ and rank by (21); for one e per contact, v⁺ and the number of pushing contacts
         by Poisson's law."""
-        mass, rows = self.mass_matrix, self.meant_jacobian
+        mass = self.mass_matrix
+        rows = self.meant_jacobian
         if np.ndim(self.restitution):
             return exact_poisson(mass, rows, self.velocity, np.asarray(self.restitution))
         impact = exact_impact(mass, rows, self.velocity, float(self.restitution))
@@ -239,7 +242,8 @@ def largest_gain(run: Run) -> float:
     coupling also store energy, and this energy is never negative. Therefore a positive gain is
     energy that the simulation has created.
     """
-    potential, given = run.energy["potential"], work_given(run, device=True)
+    potential = run.energy["potential"]
+    given = work_given(run, device=True)
     dropped = float(potential[0] - potential.min())
     kinetic = run.energy["kinetic"][0] + run.energy.get("device_kinetic", [0.0])[0]
     fed = float(kinetic + np.abs(given).max()) + dropped

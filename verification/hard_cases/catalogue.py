@@ -30,11 +30,10 @@ def written_case(name: str) -> HardCase:
     arrays = {
         key: np.array(given[key], dtype=object) for key in ("M", "J", "v", "e", "T") if key in given
     }
-    exact, numbers = (
-        _fractions(arrays["J"]),
-        {key: _fractions(array).astype(float) for key, array in arrays.items()},
-    )
-    mass, e = numbers["M"], numbers["e"]
+    exact = _fractions(arrays["J"])
+    numbers = {key: _fractions(array).astype(float) for key, array in arrays.items()}
+    mass = numbers["M"]
+    e = numbers["e"]
     arguments: dict[str, Any] = dict(
         name=given["name"],
         source=given["source"],

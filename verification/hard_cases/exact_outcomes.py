@@ -31,16 +31,13 @@ def exact_poisson(
     The two LCPs are compression, `0 ≤ p_c ⟂ γ_c ≥ 0`, and restitution, `0 ≤ p_e − E p_c ⟂ γ⁺ ≥ 0`
     (docs/theory.md).
     """
-    M, J = (
-        rational_matrix("mass_matrix", mass_matrix),
-        rational_matrix("contact_jacobian", contact_jacobian),
-    )
-    v, e = (
-        rational_matrix("velocity", velocity),
-        rational_matrix("restitution", restitution).entries(),
-    )
+    M = rational_matrix("mass_matrix", mass_matrix)
+    J = rational_matrix("contact_jacobian", contact_jacobian)
+    v = rational_matrix("velocity", velocity)
+    e = rational_matrix("restitution", restitution).entries()
     columns = M.solve(J.transpose())  # M⁻¹Jᵀ, one column per contact
-    W, gamma = J * columns, J * v
+    W = J * columns
+    gamma = J * v
     compression = _lcp(W, gamma)
     returned = _column(
         J, [p + share * p for p, share in zip(compression.entries(), e, strict=True)]
@@ -56,9 +53,11 @@ def _column(like: Rational, entries: list[Any]) -> Rational:
 def _lcp(W: Rational, q: Rational) -> Rational:
     """Solve 0 ≤ p ⟂ W p + q ≥ 0 by enumeration; for a Delassus matrix W some set of independent
     contacts solves it."""
-    n, make = q.nrows(), type(W)
+    n = q.nrows()
+    make = type(W)
     for chosen in (chosen for size in range(n + 1) for chosen in combinations(range(n), size)):
-        p, size = [0 * q[0, 0]] * n, len(chosen)
+        p = [0 * q[0, 0]] * n
+        size = len(chosen)
         if chosen:
             try:
                 block = make(size, size, [W[i, j] for i in chosen for j in chosen])
@@ -87,17 +86,19 @@ class FrictionalImpact:
         restitution: float,
         friction: float,
     ) -> None:
-        self.mass, self.v = (
-            rational_matrix("mass_matrix", mass_matrix),
-            rational_matrix("velocity", velocity),
-        )
-        n, t = rational_matrix("normal", normal), rational_matrix("tangent", tangent)
+        self.mass = rational_matrix("mass_matrix", mass_matrix)
+        self.v = rational_matrix("velocity", velocity)
+        n = rational_matrix("normal", normal)
+        t = rational_matrix("tangent", tangent)
         self.e, mu = rational_matrix("coefficients", [restitution, friction]).entries()
-        to_n, to_t = self.mass.solve(n.transpose()), self.mass.solve(t.transpose())
-        self.w, self.gamma = (n * to_n)[0, 0], (n * self.v)[0, 0]
+        to_n = self.mass.solve(n.transpose())
+        to_t = self.mass.solve(t.transpose())
+        self.w = (n * to_n)[0, 0]
+        self.gamma = (n * self.v)[0, 0]
         across = (n * to_t)[0, 0] / self.w
         p_n = -(1 + self.e) * self.gamma / self.w
-        self.normal, self.b = to_n * p_n, to_t - to_n * across
+        self.normal = to_n * p_n
+        self.b = to_t - to_n * across
         self.p_t = _coulomb((t * (self.v + self.normal))[0, 0], (t * self.b)[0, 0], p_n, across, mu)
 
     def velocity(self, share: Any) -> tuple[Fraction, ...]:
@@ -110,7 +111,8 @@ class FrictionalImpact:
         α satisfies ½ s α² + a α <= loss of the normal part; s = `square`, a = `along`.
         """
         metric = (self.mass * self.b).transpose()
-        square, along = self.p_t**2 * (metric * self.b)[0, 0], self.p_t * (metric * self.v)[0, 0]
+        square = self.p_t**2 * (metric * self.b)[0, 0]
+        along = self.p_t * (metric * self.v)[0, 0]
         lost = (1 - self.e**2) * self.gamma**2 / (2 * self.w)
         if square / 2 + along <= lost:
             return 1

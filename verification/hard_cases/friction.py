@@ -109,8 +109,10 @@ def _flight() -> tuple[float, Callable[[float], NDArray[np.float64]]]:
     start = np.array([math.atan2(5, 12) - math.pi / 2, math.atan2(8, 15) - math.pi / 2, 0.0, -0.1])
 
     def rate(_: float, state: NDArray[np.float64]) -> NDArray[np.float64]:
-        (a, b), (u, w) = state[:2], state[2:]
-        c, s = 0.5 * math.cos(a - b), 0.5 * math.sin(a - b)
+        (a, b) = state[:2]
+        (u, w) = state[2:]
+        c = 0.5 * math.cos(a - b)
+        s = 0.5 * math.sin(a - b)
         force = [-s * w * w - 1.5 * _G * math.cos(a), s * u * u - 0.5 * _G * math.cos(b)]
         return np.concatenate([state[2:], np.linalg.solve([[4 / 3, c], [c, 1 / 3]], force)])
 
@@ -136,7 +138,10 @@ def _until(
 
 # --- a block pushed along the floor
 # ---------------------------------------------------------------------------
-_MU, _DURATION, _CREEP = 0.3, 0.2, 1e-3  # friction, [s], v_threshold of (6) [m/s]
+# friction, [s], v_threshold of (6) [m/s]
+_MU = 0.3
+_DURATION = 0.2
+_CREEP = 1e-3
 # Rounding over 800 steps and the settling of the springs: a correct world has no larger error.
 _KEPT = 1e-6
 # First-order error of a rigid step with Coulomb's law: half a step of the duration changes the
@@ -229,7 +234,11 @@ def pushed(share: float, name: str, expected: str) -> TrajectoryCase:
 
 # --- Painlevé's rod
 # -------------------------------------------------------------------------------------------
-_SINE, _COSINE, _ROUGH, _SPEED, _STIFF = 0.8, 0.6, 2.0, 1.0, 1e4
+_SINE = 0.8
+_COSINE = 0.6
+_ROUGH = 2.0
+_SPEED = 1.0
+_STIFF = 1e4
 _HEIGHT = (
     0.5 * _SINE + 1e-6 - 1e-9
 )  # of the centre [m]: an overlap of 1 nm, so that the contact is closed at the start
@@ -289,7 +298,8 @@ def _slipping() -> tuple[float, Callable[[NDArray[np.float64]], NDArray[np.float
         return state[3] + 0.5 * np.sin(state[2]) * state[5]
 
     def rate(_: float, state: NDArray[np.float64]) -> NDArray[np.float64]:
-        sine, cosine = math.sin(state[2]), math.cos(state[2])
+        sine = math.sin(state[2])
+        cosine = math.cos(state[2])
         push = _STIFF * max(0.0, 0.5 * sine + 1e-6 - state[1])
         turn = 12.0 * push * (-0.5 * cosine + 0.5 * sine * _ROUGH)
         return np.array([*state[3:], _ROUGH * push, push - _G, turn])
@@ -334,7 +344,9 @@ def _measure_rod(run: Run) -> Measured:
 # --- a plate pushed by a spring: stick-slip
 # ----------------------------------------------------------------------- The spring is a contact: a
 # ball of 1e8 kg with constant speed presses on the edge of a plate of 1 kg.
-_PRESS, _PRESSED = 1e4, 0.5  # spring [N/m], duration [s]
+# spring [N/m], duration [s]
+_PRESS = 1e4
+_PRESSED = 0.5
 _DAMPED = 10.0  # damper of the contact [N s/m]
 _STEADY = 0.01  # speed of the ball [m/s]
 _OMEGA = math.sqrt(_PRESS)  # [rad/s] of the plate on the spring, without the damper
@@ -343,7 +355,9 @@ _SWING = math.sqrt(_OMEGA**2 - _DECAY**2)  # [rad/s] with the damper
 _SLIDING = (
     _MU * _G / _PRESS
 )  # the spring's depth [m] in steady sliding; the start has 1.5 times this depth
-_THICK, _THIN = 2e-3, 4e-4  # the plate's height and the ball's radius [m]
+# the plate's height and the ball's radius [m]
+_THICK = 2e-3
+_THIN = 4e-4
 # Error of a step Δt in units of ωΔt times the swing V/ω. The force acts at the end of the step, as
 # if the contact had another damper KΔt, so the swing decays faster by ω²Δt/2. It loses ½ω²Δt t
 # exp(−at) of its size, at most ω²Δt/(2 e a), with a the decay rate and e Euler's number. The stick
@@ -354,7 +368,8 @@ _LATE = _OMEGA / (2.0 * math.e * _DECAY) + 2.0
 def stick_slip() -> TrajectoryCase:
     """A plate of 1 kg on a rough floor, pushed by a spring and damper whose other end moves at
     constant speed."""
-    swing, depth = _STEADY / _OMEGA, 1.5 * _SLIDING
+    swing = _STEADY / _OMEGA
+    depth = 1.5 * _SLIDING
     height = 0.5 * _THICK - _G / (2.0 * _PRESS)
     plate = {
         "name": "plate",

@@ -124,7 +124,8 @@ def _judge_motion(case: TrajectoryCase, world: str, simulate: Simulate) -> Row:
         run = (run_in_world if world == COULOMB else simulate)(case.scene, world)
     except IapbError as error:
         return _row(world, _verdict_of(error), note=str(error))
-    found, residual = case.measure(run), restitution_residual(run)
+    found = case.measure(run)
+    residual = restitution_residual(run)
     restored = not residual > RESTITUTION_TOLERANCE  # NaN: the run has no collision to judge
     verdict = _verdict(
         found.energy_gain <= found.energy_bound, restored, found.error <= found.error_bound
@@ -176,10 +177,12 @@ def faulty_motion(run: Run, fault: float) -> Run:
     If nothing moves in the run, all coordinates creep instead at this share of the scene's
     v_threshold.
     """
-    moved, sped = run.q - run.q[0], run.v - run.v[0]
+    moved = run.q - run.q[0]
+    sped = run.v - run.v[0]
     if np.abs(moved).max() < _STILL:
         creep = run.scene_resolved["contact"]["friction_velocity"]
-        moved, sped = creep * run.time[:, None] * np.ones_like(moved), creep * np.ones_like(sped)
+        moved = creep * run.time[:, None] * np.ones_like(moved)
+        sped = creep * np.ones_like(sped)
     return replace(run, q=run.q + fault * moved, v=run.v + fault * sped)
 
 
@@ -192,7 +195,8 @@ def restitution_residual(run: Run) -> float:
     rigid world the result is NaN, because its impulses also close gaps and carry the forces of the
     step.
     """
-    contacts, impacts = run.contacts, run.impacts
+    contacts = run.contacts
+    impacts = run.impacts
     struck = np.flatnonzero(contacts.impulse)
     if run.law == "rigid constraints" or not len(struck):
         return math.nan
@@ -200,13 +204,19 @@ def restitution_residual(run: Run) -> float:
     first = np.searchsorted(impacts.step, step)
     last = np.searchsorted(impacts.step, step, side="right") - 1
     at_once = impacts.time[first] == impacts.time[last]  # contacts show one moment of a step
-    struck, step, first, last = struck[at_once], step[at_once], first[at_once], last[at_once]
-    mechanism, q = mechanism_of(scene_from_text(run.scene_source)), impacts.q[first]
-    point, normal = contacts.point[struck], contacts.normal[struck]
+    struck = struck[at_once]
+    step = step[at_once]
+    first = first[at_once]
+    last = last[at_once]
+    mechanism = mechanism_of(scene_from_text(run.scene_source))
+    q = impacts.q[first]
+    point = contacts.point[struck]
+    normal = contacts.normal[struck]
     rows = mechanism.rows_along(q, contacts.body_a[struck], point, normal)
     rows -= mechanism.rows_along(q, contacts.body_b[struck], point, normal)
     rows *= contacts.impulse[struck, None]
-    v_minus, v_plus = impacts.v_minus[first], impacts.v_plus[last]
+    v_minus = impacts.v_minus[first]
+    v_plus = impacts.v_plus[last]
     before = np.bincount(step, np.einsum("kd,kd->k", rows, v_minus))
     after = np.bincount(step, np.einsum("kd,kd->k", rows, v_plus))
     judged = after - before > 0.0
@@ -241,7 +251,8 @@ def judge_impact(case: HardCase, method: str) -> Row:
         """Return the verdict, the energy gain, the restitution residual and the distance from the
         truth."""
         gain = relative_energy_gain(case.mass_matrix, case.velocity, v_plus)
-        residual, distance = _unmet(case, v_plus), _forward_error(case, v_plus)
+        residual = _unmet(case, v_plus)
+        distance = _forward_error(case, v_plus)
         right = not case.well_posed or distance <= forward_bound
         return (
             _verdict(gain <= energy_bound, residual <= RESTITUTION_TOLERANCE, right),
@@ -253,7 +264,8 @@ def judge_impact(case: HardCase, method: str) -> Row:
     def is_seen(wrong: Floats, size: float) -> bool:
         return measured(answer.velocity + size * wrong)[0] != STABLE
 
-    (verdict, gain, residual, distance), fault = measured(answer.velocity), np.nan
+    (verdict, gain, residual, distance) = measured(answer.velocity)
+    fault = np.nan
     near = RESTITUTION_TOLERANCE / _NOISE <= residual <= RESTITUTION_TOLERANCE * _NOISE
     noise = verdict in ("gains energy", "restitution unmet") and distance > _ALL_NOISE
     if method in _THROUGH_LAPACK and (verdict != "gains energy" and near or noise):
@@ -269,7 +281,8 @@ def judge_impact(case: HardCase, method: str) -> Row:
 
 def allowed_error(case: HardCase) -> float:
     """Return the largest error of v⁺ by rounding, in the kinetic metric, relative to |v⁻|."""
-    truth, n = case.truth, max(case.contact_jacobian.shape)
+    truth = case.truth
+    n = max(case.contact_jacobian.shape)
     root = float(np.sqrt(truth.scaled_condition))
     diagonal = (
         sum((Fraction(x) for x in np.diag(case.mass_matrix)), Fraction(0)) * _HALF_SUBNORMAL**2
@@ -294,17 +307,20 @@ def resolve_once(case: HardCase, method: str) -> Answer:
     given = case.mass_matrix, case.contact_jacobian, case.velocity, case.restitution
     rank: int | None = None
     if isinstance(case, FrictionalCase) and method == NEWTON_COULOMB:
-        velocity, rank = np.array([float(x) for x in case.impact.velocity(1)]), 1
+        velocity = np.array([float(x) for x in case.impact.velocity(1)])
+        rank = 1
     elif isinstance(case, FrictionalCase):
         rubbed = resolve_frictional_impact(
             *given[:2], case.tangent, case.velocity, float(given[3]), case.friction
         )
-        velocity, rank = rubbed.velocity, 1
+        velocity = rubbed.velocity
+        rank = 1
     elif method in COMPARED:
         velocity = COMPARED[method](*given)
     else:
         impact = resolve_impact(*given, clamp=None if method == "factored" else False)
-        velocity, rank = impact.velocity, impact.rank
+        velocity = impact.velocity
+        rank = impact.rank
     if method in COMPARED and not np.isfinite(velocity).all():
         raise RangeError("velocity", f"{method} works on the numbers as given")
     return Answer(velocity, rank)
@@ -314,7 +330,9 @@ def _unmet(case: HardCase, v_plus: Floats) -> float:
     """Return the largest relative violation of the law on the given rows; scaled speeds prevent
     underflow."""
     unit = float(np.max(np.abs(case.velocity), initial=0.0)) or 1.0
-    J, v, after = case.contact_jacobian, case.velocity / unit, v_plus / unit
+    J = case.contact_jacobian
+    v = case.velocity / unit
+    after = v_plus / unit
     lower = np.linalg.cholesky(case.mass_matrix)
     scale = np.linalg.norm(np.linalg.solve(lower, J.T), axis=0) * np.linalg.norm(lower.T @ v)
     if np.ndim(case.restitution):

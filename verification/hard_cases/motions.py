@@ -21,7 +21,10 @@ from verification.hard_cases.case import (
 
 # --- a ball that chatters
 # --------------------------------------------------------------------------------------
-_HEIGHT, _GRAVITY, _RESTITUTION, _RADIUS = 0.1, 9.81, 0.5, 0.1
+_HEIGHT = 0.1
+_GRAVITY = 9.81
+_RESTITUTION = 0.5
+_RADIUS = 0.1
 # Each bounce is up to one step late: bounce k is k steps late at speed v eᵏ, in sum v Δt Σ k eᵏ = 2
 # v Δt for e = ½. The first bounce penetrates by one step, and the height between two instants has
 # an error of one step, too.
@@ -61,7 +64,8 @@ def chatter() -> TrajectoryCase:
 def exact_height(time: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the height of the ball above the floor [m] by the closed form."""
     height = np.where(time < _FALL, _HEIGHT - 0.5 * _GRAVITY * time**2, 0.0)
-    start, speed = _FALL, _GRAVITY * _FALL * _RESTITUTION
+    start = _FALL
+    speed = _GRAVITY * _FALL * _RESTITUTION
     while speed * speed / (2.0 * _GRAVITY) > np.finfo(float).eps * _HEIGHT:
         flown = time - start
         height = np.where(
@@ -69,7 +73,8 @@ def exact_height(time: NDArray[np.float64]) -> NDArray[np.float64]:
             speed * flown - 0.5 * _GRAVITY * flown**2,
             height,
         )
-        start, speed = start + 2.0 * speed / _GRAVITY, speed * _RESTITUTION
+        start = start + 2.0 * speed / _GRAVITY
+        speed = speed * _RESTITUTION
     return np.asarray(height, np.float64)
 
 
@@ -83,12 +88,11 @@ def _measure_chatter(run: Run) -> Measured:
 # --- a sampled wall: it is passive if b > K T / 2 + |B|; otherwise its spring can create energy
 # -------------------
 _PHYSICAL_DAMPING = 0.5  # b [N s/m] of the device of scenes/wall_1d.yaml
-_MASS, _FORCE, _COUPLING, _COUPLING_DAMPING = (
-    2.0,
-    0.4,
-    100.0,
-    70.0,
-)  # of tool and device, hand, coupling, in SI units
+# of tool and device, hand, coupling, in SI units
+_MASS = 2.0
+_FORCE = 0.4
+_COUPLING = 100.0
+_COUPLING_DAMPING = 70.0
 _RADIUS_OF_HANDLE = 0.01
 _BOUND = 2.0 * _PHYSICAL_DAMPING * 512.0  # K [N/m] with B = 0
 # Rounding over 1,536 steps, which each new contact amplifies: measured 1e-9 of the distance; faults
@@ -136,7 +140,8 @@ def sampled_wall(law: str, stiffness: float, steps: int, dt: float) -> NDArray[n
     per step."""
     x = [-0.03, -0.03]
     v = [0.1, 0.1]
-    touching, path = False, [x[0]]
+    touching = False
+    path = [x[0]]
     for _ in range(steps):
         coupling = _COUPLING * (x[1] - x[0]) + _COUPLING_DAMPING * (v[1] - v[0])
         depth = x[0] + _RADIUS_OF_HANDLE
@@ -156,7 +161,10 @@ def sampled_wall(law: str, stiffness: float, steps: int, dt: float) -> NDArray[n
 
 # --- a peg wedged in its hole
 # ------------------------------------------------------------------------------------
-_STIFFNESS, _HAND, _DRAFT = 1000.0, 0.4, 0.01  # from scenes/peg_hole.yaml: [N/m], [N], slope
+# from scenes/peg_hole.yaml: [N/m], [N], slope
+_STIFFNESS = 1000.0
+_HAND = 0.4
+_DRAFT = 0.01
 _END = 0.0105  # y [m] of the peg's centre when its front meets the hole's end
 _STOPPED = 1e-9  # largest speed [m/s] of a body at rest: ten decades below that of the impact
 # Relative tolerance of the springs' rest position: after one second the coupling has settled to

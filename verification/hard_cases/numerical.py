@@ -44,7 +44,8 @@ def contacts(count: int, name: str, why_hard: str, expected: str) -> HardCase:
 
 def printed_formula_gains() -> HardCase:
     """An elastic impact at rows that differ by 1e-4, with a mass matrix of condition number 1e6."""
-    rng, d = np.random.default_rng(7), 6
+    rng = np.random.default_rng(7)
+    d = 6
     mass, _ = _mass(rng, d, 6.0)
     base = rng.normal(size=(2, d))
     rows = np.vstack(
@@ -89,7 +90,8 @@ def hilbert_rows() -> HardCase:
 def kahan_rows() -> HardCase:
     """An impact with the rows of Kahan's matrix: pivots suggest rank n, but one singular value is
     far smaller."""
-    n, c = 24, 0.6
+    n = 24
+    c = 0.6
     s = np.sqrt(1.0 - c * c)
     rows = s ** np.arange(n)[:, None] * (np.eye(n) - c * np.triu(np.ones((n, n)), 1))
     return HardCase(
@@ -108,7 +110,8 @@ def kahan_rows() -> HardCase:
 def light_direction() -> HardCase:
     """An elastic impact with v along M's lightest direction, κ(M) = 1e12 and random rows in the
     kinetic metric."""
-    rng, d = np.random.default_rng(34), 6
+    rng = np.random.default_rng(34)
+    d = 6
     mass, axes = _mass(rng, d, 12.0)
     rows = rng.normal(size=(3, d)) @ np.linalg.cholesky(mass).T
     return HardCase(

@@ -16,11 +16,13 @@ from iapb.run import Run
 from iapb.scene import Scene
 from verification.hard_cases.case import NO_GAIN, Measured, TrajectoryCase, largest_gain, on_floor
 
-_G, _MU = 9.81, 0.5
+_G = 9.81
+_MU = 0.5
 _ENGINE = ("IAPB", "PB", "IAPB-friction")
 # Width and height [m], stiffness [N/m]. The slabs of a stack oscillate on their springs without
 # slipping.
-BOX, SLAB = (0.15, 0.05, 1e4), (0.3, 0.02, 5e4)
+BOX = (0.15, 0.05, 1e4)
+SLAB = (0.3, 0.02, 5e4)
 _LONG = 10.0  # [s]
 _SECOND_ORDER = (
     0.02  # relative error of the lean per box: the contact point lies at half the overlap
@@ -32,7 +34,9 @@ def _boxes(
 ) -> Scene:
     """Return a scene of boxes of 1 kg on one another on a slope [rad]; each starts with its static
     overlap."""
-    (width, height, stiffness), level, boxes = sort, 0.0, []
+    (width, height, stiffness) = sort
+    level = 0.0
+    boxes = []
     for k in range(count):
         level += height - (count - k) * _G * math.cos(slope) / (2.0 * stiffness)
         boxes.append(
@@ -66,7 +70,8 @@ def _boxes(
 def nudged_box() -> TrajectoryCase:
     """A box that starts at 0.2 m/s on a flat floor."""
     speed = 0.2
-    way, stopped = speed**2 / (2.0 * _MU * _G), speed / (_MU * _G)
+    way = speed**2 / (2.0 * _MU * _G)
+    stopped = speed / (_MU * _G)
 
     def measure(run: Run) -> Measured:
         """Measure the largest distance from the stopping place, from a tenth of a second after the

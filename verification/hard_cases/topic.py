@@ -20,7 +20,8 @@ from verification.ordinary.touch import TOUCH
 from verification.table import Row, Table
 
 ENGINE = ("factored", "IAPB")  # the engine's default impact method and its world
-IMPACT, MOTION = "impact", "motion"
+IMPACT = "impact"
+MOTION = "motion"
 INSTANTS = 600  # of a failing motion
 SHOWN_STEP = 1.0  # [ms] at which the page quotes the errors of the motions with touches
 
@@ -139,7 +140,8 @@ FAILURE = Check(
 
 def _numbers(tables: Mapping[str, Table]) -> Values:
     """Return what the page quotes."""
-    every, ordinary = tables[EVERY_METHOD.key], tables[ORDINARY.key]
+    every = tables[EVERY_METHOD.key]
+    ordinary = tables[ORDINARY.key]
     rows = every.records()
     wrong = failing(every)
     others = {row["case"] for row in rows if row["method"] not in ENGINE and is_right(row) is False}

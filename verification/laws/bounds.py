@@ -172,7 +172,8 @@ class Bounds:
         fastest) has a smaller σ, limited by its rank decision: the tolerance is `restitution` or
         more.
         """
-        root, rank = np.sqrt(case.condition), len(case.row_space)
+        root = np.sqrt(case.condition)
+        rank = len(case.row_space)
         smallest = case.smallest_motion / np.sqrt(1.0 + rank * (case.contacts - rank))
         rounding = 100.0 * case.coordinates * EPS * float(root * (root + 1.0 / smallest))
         noise = 4.0 * float(np.sqrt(max(case.contacts, 1)) * case.largest_noise / smallest)

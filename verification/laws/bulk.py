@@ -23,8 +23,11 @@ from verification.impacts import ADVERSE_FAMILIES, ANY_RANK, EPS, Floats, Impact
 from verification.methods import gram_pinv
 from verification.table import HOLDS, Row, Table
 
-OURS, NO_CLAMP, PRINTED = "IAPB", "IAPB, no clamp", "printed formula"
-GAIN, MEDIAN = "largest relative gain", "median relative gain of those that gain"
+OURS = "IAPB"
+NO_CLAMP = "IAPB, no clamp"
+PRINTED = "printed formula"
+GAIN = "largest relative gain"
+MEDIAN = "median relative gain of those that gain"
 SHARE = "gain / (10 d ε √κ)"
 SLOW = "subnormal velocities"  # takes 2 ms an impact, the others some µs: a quarter of the impacts
 # scaled as in `resolve_impact`; the other families stay in their units, as in compiled steps
@@ -51,7 +54,8 @@ def by_engine(given: Impacts, scale: bool, clamped: bool = True) -> tuple[Floats
         rows = given.columns.transpose(0, 2, 1)
         found = resolve_impacts(given.mass, rows, given.v, given.restitution, clamp=clamped)
         return found.velocity, found.clamp
-    v_plus, clamps = np.empty((n, d)), np.empty(n)
+    v_plus = np.empty((n, d))
+    clamps = np.empty(n)
     work = block(zeros_of(ImpactWork, velocity=d, row=c))
     factored_impacts(*given[:4], d, clamped, 1, work, v_plus, clamps)
     return v_plus, clamps
@@ -83,7 +87,10 @@ def judged_impacts(family: str, impacts: int, method: str = OURS, seed: int = SE
     rng = np.random.default_rng([seed, *family.encode()])
     coordinates, contacts, batch = LARGEST[family]
     least = 0 if family == ANY_RANK else 1
-    gains, moved, cancelled, share = 0, 0, 0, 0.0
+    gains = 0
+    moved = 0
+    cancelled = 0
+    share = 0.0
     found: list[float] = []
     for start in range(0, impacts, batch):
         d = int(rng.integers(1, coordinates + 1))

@@ -27,7 +27,9 @@ import numpy as np
 
 from verification.laws.resolver import Resolver, ResolverFault, answer_of
 
-FRESH, LAST = "fresh", "last"  # messages: start a new worker; end
+# messages: start a new worker; end
+FRESH = "fresh"
+LAST = "last"
 _CLOSED = 9  # exit status of a worker that ends the keeper, too
 _NOTE = struct.Struct("dq")  # start of the call that runs now, and length of its arguments
 _ROOM = 1 << 22  # bytes for the arguments of one call
@@ -107,7 +109,10 @@ class _Keeper:
     def __init__(
         self, resolver: Resolver, pipe: Connection, limit: float, name: str, noted: mmap.mmap
     ) -> None:
-        self.resolver, self.pipe, self.limit, self.name = resolver, pipe, limit, name
+        self.resolver = resolver
+        self.pipe = pipe
+        self.limit = limit
+        self.name = name
         self.noted = noted
         self.named = 0.0  # start of the call that was named last
         self.terminal = os.dup(2)

@@ -67,11 +67,10 @@ OF_VARIANTS = (
     "maximal_dissipation",
 )
 CLEAR = 0.05  # least singular value of one contact's unit rows, for laws that need its impulse
-_REFINEMENTS, _STEPS, NEAR = (
-    20,
-    5000,
-    1e-8,
-)  # searches of a cone by rays and by steps; the distance that ends them
+# searches of a cone by rays and by steps; the distance that ends them
+_REFINEMENTS = 20
+_STEPS = 5000
+NEAR = 1e-8
 
 UNILATERAL_LAWS: dict[str, Law] = {name: LAWS[name] for name in ("kinetic_energy", "impulse_range")}
 FRICTIONAL_LAWS: dict[str, Law] = UNILATERAL_LAWS | {
@@ -81,7 +80,8 @@ FRICTIONAL_LAWS: dict[str, Law] = UNILATERAL_LAWS | {
 
 def _normal_velocities(case: ImpactCase, velocity: Floats) -> Floats:
     """Return γᵢ / (‖Aᵢ‖ |u⁻|) (c,); 0 on zero rows, infinite if motion appears from rest."""
-    gamma, scale = case.contact_jacobian @ velocity, np.linalg.norm(case.rows, axis=1) * case.speed
+    gamma = case.contact_jacobian @ velocity
+    scale = np.linalg.norm(case.rows, axis=1) * case.speed
     appeared = np.where(gamma == 0.0, 0.0, np.copysign(np.inf, gamma))
     return np.divide(gamma, scale, out=appeared, where=scale > 0.0)
 
@@ -136,15 +136,14 @@ def distance_from_cone(case: ImpactCase, target: Floats) -> float:
     fixed = np.repeat(
         np.vstack([np.zeros((1, m)), np.eye(m), -np.eye(m)])[None], case.contacts, axis=0
     )
-    directions, distance = fixed, np.inf
+    directions = fixed
+    distance = np.inf
     for _ in range(_REFINEMENTS):  # directions (c, k, m): k rays of each contact
         rays = case.rows[:, None] + friction[:, None, None] * np.einsum(
             "ckm,cmd->ckd", directions, tangents
         )
-        used, p = (
-            directions,
-            least_push(rays.reshape(-1, case.coordinates), target).reshape(directions.shape[:2]),
-        )
+        used = directions
+        p = least_push(rays.reshape(-1, case.coordinates), target).reshape(directions.shape[:2])
         rest = target - np.einsum("ck,ckd->d", p, rays)
         distance = min(distance, float(np.linalg.norm(rest)))
         if distance <= NEAR:
@@ -172,8 +171,11 @@ def _descend(blocks: Floats, friction: np.ndarray, target: Floats, p: Floats) ->
     """
     size = np.linalg.norm(blocks, axis=(1, 2))[:, None]
     size[size == 0.0] = 1.0
-    rows, p = (blocks / size[:, :, None]).reshape(-1, len(target)), p * size
-    length, moved, pace = 1.0 / max(float(np.linalg.norm(rows, 2)) ** 2, 1.0), p, 1.0
+    rows = (blocks / size[:, :, None]).reshape(-1, len(target))
+    p = p * size
+    length = 1.0 / max(float(np.linalg.norm(rows, 2)) ** 2, 1.0)
+    moved = p
+    pace = 1.0
     nearest = np.inf
     for _ in range(_STEPS):
         tried = project_on_cone(
@@ -190,7 +192,9 @@ def _descend(blocks: Floats, friction: np.ndarray, target: Floats, p: Floats) ->
         if np.sum((moved - tried) * (tried - p)) > 0.0:
             pace = 1.0
         faster = 0.5 * (1.0 + np.sqrt(1.0 + 4.0 * pace * pace))
-        moved, p, pace = tried + (pace - 1.0) / faster * (tried - p), tried, faster
+        moved = tried + (pace - 1.0) / faster * (tried - p)
+        p = tried
+        pace = faster
     return float("nan")
 
 
@@ -221,7 +225,8 @@ def pushing_contacts_meet_restitution(
     not determine."""
     if not _all_approach(case) or case.speed == 0.0:
         return None
-    u, change = case.u, _change(case, resolver)
+    u = case.u
+    change = _change(case, resolver)
     value = abs(float(change @ (change + (1.0 + case.restitution) * u))) / case.speed**2
     return value, 2.0 * bounds.restitution
 
@@ -244,7 +249,9 @@ def mixed_impacts_follow_newton_or_poisson(
         or not np.any(before > TOUCHING)
     ):
         return None
-    u, rows, e = case.u, case.unit_rows, case.restitution
+    u = case.u
+    rows = case.unit_rows
+    e = case.restitution
     newton = u + (1.0 + e) * (rows.T @ least_push(rows, -u))
     poisson = newton + rows.T @ least_push(rows, -newton)
     found = case.lower.T @ own_outcome(resolver, case)
@@ -361,7 +368,8 @@ def contacts_stick_where_they_can(case: ImpactCase, resolver: Resolver, bounds: 
     single = _single(case)
     if single is None:
         return None
-    W, mu = single.delassus, float(single.friction[0])
+    W = single.delassus
+    mu = float(single.friction[0])
     p = -np.linalg.solve(W, single.given @ case.velocity)
     kappa = mu * float(np.linalg.norm(W[0, 1:])) / W[0, 0]
     if not mu * p[0] > 1.001 * (1.0 + 2.0 * kappa) * float(np.linalg.norm(p[1:])):

@@ -94,8 +94,11 @@ class Hunt:
         seconds: float,
         tell: Callable[[], None],
     ) -> None:
-        self.law, self.kind, self.bounds = law, kind_of(fault), bounds
-        self.resolver, self.child = child or resolver, child
+        self.law = law
+        self.kind = kind_of(fault)
+        self.bounds = bounds
+        self.resolver = child or resolver
+        self.child = child
         self.ends = time.monotonic() + seconds
         self.half = self.ends if child is None else self.ends - 0.5 * seconds
         self.tell = tell
@@ -148,7 +151,8 @@ class Hunt:
     ) -> tuple[ImpactCase, tuple[bytes, ...]] | None:
         """Return an impact that a fresh resolver fails after some of these calls, and those; None if
         it keeps the law after all of them."""
-        own, every = pickle.dumps(case.given()), list(calls)
+        own = pickle.dumps(case.given())
+        every = list(calls)
         before = every[: len(every) - 1 - every[::-1].index(own)] if own in every else every
         tried = (some for given in (before, every) for some in _parts(given))
         earlier = next((some for some in tried if self.breaks(case, earlier=some)), None)
@@ -227,7 +231,8 @@ def shrink(
         improved = False
         for smaller in (smaller_of or _valid)(case):
             if fails(smaller):
-                case, improved = smaller, True
+                case = smaller
+                improved = True
                 break
     return case
 
@@ -364,7 +369,8 @@ def _repeating(earlier: Sequence[bytes]) -> Iterator[str]:
     if earlier:
         yield "    # the failure depends on these calls before it"
     for pickled, same in groupby(earlier):
-        count, indent = len(list(same)), "    "
+        count = len(list(same))
+        indent = "    "
         if count > 1:
             yield f"    for _ in range({count}):"
             indent = 2 * indent
@@ -379,7 +385,8 @@ def import_line(resolver: Any) -> str:
     """Return the lines that import `resolver`; empty for a lambda or another function that cannot
     be imported."""
     inner = resolver.func if isinstance(resolver, partial) and not resolver.args else resolver
-    module, name = getattr(inner, "__module__", None), getattr(inner, "__qualname__", "")
+    module = getattr(inner, "__module__", None)
+    name = getattr(inner, "__qualname__", "")
     if not isinstance(module, str) or module == "__main__":
         return ""
     if getattr(sys.modules.get(module), name, None) is not inner:

@@ -69,7 +69,8 @@ def draw_limited(rng: np.random.Generator) -> LimitedImpact:
     """Draw an impact and force limits between 0.01 and 10 times the force that its impulse needs,
     or infinite."""
     case = draw_case(rng)
-    Q, u = case.row_space, case.u
+    Q = case.row_space
+    u = case.u
     impulse = -(1.0 + case.restitution) * (case.lower @ (Q.T @ (Q @ u)))
     dt = float(rng.choice([1.0 / 512.0, 1e-3]))
     limit = (np.abs(impulse) / dt + 1e-9) * 10.0 ** rng.uniform(-2.0, 1.0, size=len(u))
@@ -95,7 +96,8 @@ def saturation_counterexample() -> LimitedImpact:
     The full impulse (0.12, 0.16) N s takes 2 % of the kinetic energy. The device renders only
     (0.12, 0.01) N s and gains 12 %.
     """
-    normal, velocity = np.array([0.6, 0.8]), np.array([1.0, -1.0])
+    normal = np.array([0.6, 0.8])
+    velocity = np.array([1.0, -1.0])
     case = ImpactCase(np.eye(2), normal[None], velocity, 0.0, "clipped component by component")
     return LimitedImpact(case, -normal * float(normal @ velocity), 1e-3, np.array([1000.0, 10.0]))
 
@@ -111,7 +113,8 @@ def limited_impulses_are_passive(case: LimitedImpact, subject: Renderer) -> Foun
     """Larger relative energy gain of tool and device, both from v⁻; infinite if the device exceeds
     its limit."""
     tool_impulse, device_force = subject(case.impulse.copy(), case.dt, case.force_limit.copy())
-    mass, v = case.impact.mass_matrix, case.impact.velocity
+    mass = case.impact.mass_matrix
+    v = case.impact.velocity
     gains = [
         relative_gain(mass, v, v + np.linalg.solve(mass, p))
         for p in (tool_impulse, case.dt * device_force)
@@ -123,10 +126,9 @@ def limited_impulses_are_passive(case: LimitedImpact, subject: Renderer) -> Foun
 # The engine splits the contacts of a step into groups and resolves each separately: two scenes
 # without common contacts move the same, simulated together or apart, unless one passes a factor, a
 # budget or a state on to the other.
-STEPS, APART = (
-    200,
-    16.0,
-)  # [m] between the rooms; a power of two, so that positions in both round alike
+# [m] between the rooms; a power of two, so that positions in both round alike
+STEPS = 200
+APART = 16.0
 
 
 @dataclass(frozen=True)
@@ -162,7 +164,9 @@ def _room(bodies: list[Values], name: str, x: float) -> Values:
             return own | {"position": [body["position"][0] + x, *body["position"][1:]]}
         return own | {"origin": [x, 0.0]}
 
-    middle, upright, flat = ROOM + 1.0, [2.0, 6.0], [6.0, 2.0]
+    middle = ROOM + 1.0
+    upright = [2.0, 6.0]
+    flat = [6.0, 2.0]
     slabs = (
         (middle, 0.0, upright),
         (-middle, 0.0, upright),
@@ -190,7 +194,9 @@ def groups_apart_move_alike(case: TwoRooms, subject: Callable[[SceneCase], Run])
     A compiled sum over more entries may add them in another order, so the last bits may differ.
     Later instants are not judged, because collisions amplify such differences.
     """
-    together, one, other = subject(case.together), subject(case.one), subject(case.other)
+    together = subject(case.together)
+    one = subject(case.one)
+    other = subject(case.other)
     d = one.v.shape[1]
     worst = max(
         _first_difference(together, one, slice(0, d)),
@@ -208,7 +214,8 @@ def _first_difference(together: Run, apart: Run, of: slice) -> float:
     differs = np.flatnonzero(np.any(all_states != own_states, axis=1))
     if not len(differs):
         return 0.0
-    a, b = all_states[differs[0]], own_states[differs[0]]
+    a = all_states[differs[0]]
+    b = own_states[differs[0]]
     return float(np.max(np.abs(a - b)) / np.max(np.abs(b)))
 
 
@@ -237,7 +244,8 @@ def judge_engine_law(
     name: str, subject: Callable[..., Any] | None = None, cases: int = 300, seed: int = 0
 ) -> LawCount:
     """Check one law on `cases` random cases; `subject` replaces the engine's own subject."""
-    one, rng = ENGINE_LAWS[name], np.random.default_rng([seed, list(ENGINE_LAWS).index(name)])
+    one = ENGINE_LAWS[name]
+    rng = np.random.default_rng([seed, list(ENGINE_LAWS).index(name)])
     count = LawCount(name)
     for _ in range(cases):
         count.add(one.check(one.draw(rng), one.ours if subject is None else subject))

@@ -143,13 +143,16 @@ def _change_and_ride(case: ImpactCase, resolver: Resolver) -> tuple[float, float
     translations z."""
     if case.translations is None or case.speed == 0.0 or not case.is_separated:
         return None
-    v_plus, changed, apart = own_outcome(resolver, case), 0.0, 0.0
+    v_plus = own_outcome(resolver, case)
+    changed = 0.0
+    apart = 0.0
     for z in case.translations:
         size = float(np.linalg.norm(case.lower.T @ z))
         change = abs(float(z @ case.mass_matrix @ (v_plus - case.velocity))) / (size * case.speed)
         ride = z * (case.speed / size)
         moved = outcome(resolver, replace(case, velocity=case.velocity + ride))
-        changed, apart = max(changed, change), max(apart, case.distance(moved, v_plus + ride))
+        changed = max(changed, change)
+        apart = max(apart, case.distance(moved, v_plus + ride))
     return changed, apart
 
 
@@ -201,7 +204,8 @@ def row_scale_does_not_matter(case: ImpactCase, resolver: Resolver, bounds: Boun
     """
     if not case.is_separated or case.contacts == 0:
         return None
-    plain, rows = own_outcome(resolver, case), case.contact_jacobian
+    plain = own_outcome(resolver, case)
+    rows = case.contact_jacobian
     by_powers, by_factors = (
         outcome(
             resolver,
@@ -251,14 +255,16 @@ def groups_do_not_interact(case: ImpactCase, resolver: Resolver, bounds: Bounds)
     if not case.is_separated or case.speed == 0.0:
         return None
     mass, rows, v, d = *case.arrays, case.coordinates
-    mirror, blocks = -rows[::-1], (np.zeros_like(mass), np.zeros_like(rows))
+    mirror = -rows[::-1]
+    blocks = (np.zeros_like(mass), np.zeros_like(rows))
     together = _varied(
         case,
         np.block([[mass, blocks[0]], [blocks[0], mass]]),
         np.block([[rows, blocks[1]], [blocks[1], mirror]]),
         np.concatenate([v, -2.0 * v]),
     )
-    both, alone = outcome(resolver, together), own_outcome(resolver, case)
+    both = outcome(resolver, together)
+    alone = own_outcome(resolver, case)
     mirrored = outcome(resolver, replace(case, contact_jacobian=mirror.copy(), velocity=-2.0 * v))
     distance = max(case.distance(both[:d], alone), case.distance(both[d:], mirrored))
     return distance, 2.0 * bounds.comparison(together)
@@ -330,7 +336,8 @@ def unequal_rows_in_any_order(case: ImpactCase, resolver: Resolver, bounds: Boun
     """
     if not case.is_separated or case.contacts == 0 or case.unequal is None:
         return None
-    rows, e = case.contact_jacobian, case.unequal
+    rows = case.contact_jacobian
+    e = case.unequal
     scaled = rows * np.resize(_FACTORS, case.contacts)[:, None]
     turned = replace(case, contact_jacobian=scaled[::-1].copy(), unequal=e[::-1].copy())
     twice = replace(case, contact_jacobian=np.vstack([rows, rows[:1]]), unequal=np.append(e, e[0]))

@@ -26,12 +26,10 @@ from verification.laws.resolver import Resolver
 from verification.laws.scenes import draw_scene, draw_spatial_scene
 from verification.laws.trajectories import judge_run
 
-IMPACTS, UNEQUAL, TRAJECTORIES, IN_SPACE = (
-    "impacts",
-    "unequal restitution",
-    "trajectories",
-    "trajectories in space",
-)
+IMPACTS = "impacts"
+UNEQUAL = "unequal restitution"
+TRAJECTORIES = "trajectories"
+IN_SPACE = "trajectories in space"
 PARTS = (
     IMPACTS,
     UNEQUAL,

@@ -106,7 +106,8 @@ class LawVerdict(LawCount):
         try:
             residual, complaint = residual_of(law, case, resolver, bounds)
         except Exception as error:
-            self.error, self.fault = error, f"the law itself raised {type(error).__name__}: {error}"
+            self.error = error
+            self.fault = f"the law itself raised {type(error).__name__}: {error}"
             return
         if residual is None:
             return
@@ -121,13 +122,16 @@ class LawVerdict(LawCount):
             self.first_calls[bool(complaint)] = case, list(resolver.calls)
         if complaint:
             if self.fault_case is None:
-                self.fault, self.fault_case = complaint, case
+                self.fault = complaint
+                self.fault_case = case
             return
         if self.largest_case is None or residual.value > self._largest_failure:
-            self._largest_failure, self.largest_case = residual.value, case
+            self._largest_failure = residual.value
+            self.largest_case = case
         size = residual.value < NOTABLE, case.coordinates + case.contacts
         if self.smallest_case is None or size < self._smallest:
-            self._smallest, self.smallest_case = size, case
+            self._smallest = size
+            self.smallest_case = case
 
 
 class Report(str):
@@ -347,7 +351,8 @@ def check_passivity(
     >>> def test_my_resolver():
     ...     check_passivity(my_resolver, contract="unilateral").raise_if_broken()
     """
-    ends, chosen = time.monotonic() + patience, choose_laws(contract, laws, unequal_restitution)
+    ends = time.monotonic() + patience
+    chosen = choose_laws(contract, laws, unequal_restitution)
     for name, count, least in (("impacts", impacts, 1), ("seed", seed, 0)):
         if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < least:
             raise ArgumentError(name, count, f"a whole number, {least} or more")
@@ -470,7 +475,8 @@ class _Trial(NamedTuple):
 def _try_all(trial: _Trial, ends: float, progress: Callable[[int, int], None] | None) -> int:
     """Check every impact against its laws; return the number of random impacts tried within the
     time limit."""
-    watched, rng = trial.resolver, np.random.default_rng([trial.seed, 3])
+    watched = trial.resolver
+    rng = np.random.default_rng([trial.seed, 3])
     for done, case, mixed in _drawn(trial):
         large = case.coordinates >= LARGE_COORDINATES[0] or case.contacts >= LARGE_CONTACTS[0]
         for k, name in enumerate(trial.laws):
@@ -523,7 +529,8 @@ def _drawn(trial: _Trial) -> Iterator[tuple[int, ImpactCase, ImpactCase]]:
     number 0, the random ones count from 1. Without a law of unequal restitution the variant is the
     impact itself.
     """
-    unequal, seed = any(name in UNEQUAL_LAWS for name in trial.laws), trial.seed
+    unequal = any(name in UNEQUAL_LAWS for name in trial.laws)
+    seed = trial.seed
     rng, other, adverse = (np.random.default_rng(own) for own in (seed, [seed, 1], [seed, 2]))
     for case in trial.contract.first(adverse):
         yield 0, case, with_unequal_restitution(adverse, case) if unequal else case
@@ -584,10 +591,12 @@ def _counterexample(
     def search(fails: Callable[[ImpactCase], bool]) -> ImpactCase | None:
         from verification.laws.strategies import search_counterexample  # brings hypothesis
 
-        examples, seed = hunts.search, hunts.trial.seed
+        examples = hunts.search
+        seed = hunts.trial.seed
         return search_counterexample(fails, examples, seed, kind) if examples else None
 
-    case, earlier = hunt.smallest(drawn, search), tuple[bytes, ...]()
+    case = hunt.smallest(drawn, search)
+    earlier = tuple[bytes, ...]()
     later = None if case else hunt.after_calls(*broken.first_calls[bool(fault)])
     if later is not None:
         case, earlier = later
@@ -601,13 +610,16 @@ def _counterexample(
 
 def _hints(hunts: _Hunts, found: tuple[Counterexample, ...]) -> Iterator[str]:
     """Yield probable causes of failures that are no fault of the resolver's law."""
-    watched, verdicts = hunts.trial.resolver, hunts.trial.verdicts.values()
+    watched = hunts.trial.resolver
+    verdicts = hunts.trial.verdicts.values()
     broken = [verdict for verdict in verdicts if not verdict.passed]
     largest = max((verdict.largest for verdict in broken), default=0.0)
     table = "KIT" if hunts.contract == "equality" else "ONE_SIDED"
-    wider, cause = 0.0, ""
+    wider = 0.0
+    cause = ""
     if broken and 0 < watched.changed == watched.rounded:
-        wider, cause = 1e-4, "The resolver computes in single precision (set largest_condition=100)"
+        wider = 1e-4
+        cause = "The resolver computes in single precision (set largest_condition=100)"
     elif 0.0 < largest < ITERATED:
         wider = 10.0 ** np.ceil(np.log10(largest))
         cause = f"No error is above {wider:.0e}, which an iteration that ends early can explain"

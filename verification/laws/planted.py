@@ -48,7 +48,8 @@ def wrong_sign(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
 def transposed_factor(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
     """Uses L instead of Lᵀ."""
     case = ImpactCase(M, J, v)
-    Q, u = row_space(case.unit_rows), case.lower @ v
+    Q = row_space(case.unit_rows)
+    u = case.lower @ v
     return np.linalg.solve(case.lower, u - (1.0 + e) * (Q.T @ (Q @ u)))
 
 
@@ -82,7 +83,8 @@ def unscaled_rows(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
     """Decides the rank without scaling the rows, so short rows are lost."""
     case = ImpactCase(M, J, v)
     _, values, right = np.linalg.svd(case.rows, full_matrices=False)
-    Q, u = right[values > 1e-6 * np.max(values, initial=0.0)], case.u
+    Q = right[values > 1e-6 * np.max(values, initial=0.0)]
+    u = case.u
     return np.linalg.solve(case.lower.T, u - (1.0 + e) * (Q.T @ (Q @ u)))
 
 
@@ -232,7 +234,8 @@ def lost_gravity(case: SceneCase) -> Run | None:
 
 def moved_by_the_old_velocity(case: SceneCase) -> Run:
     """Combines positions of explicit Euler with velocities of semi-implicit Euler."""
-    run, mechanism = case.simulate(), System(case.scene()).mechanism
+    run = case.simulate()
+    mechanism = System(case.scene()).mechanism
     q = [run.q[0]]
     for v in run.v[:-1]:
         q.append(mechanism.integrate(q[-1], v, run.dt))
@@ -264,7 +267,8 @@ def unclamped_penalty(case: SceneCase) -> Run | None:
 def unclamped_friction(case: SceneCase) -> Run | None:
     """Records 1.5 times the friction force, which exceeds the bound of Coulomb's law."""
     run = case.simulate()
-    contacts, mu = run.contacts, run.scene_resolved["contact"]["friction"]
+    contacts = run.contacts
+    mu = run.scene_resolved["contact"]["friction"]
     length = np.linalg.norm(contacts.friction_force, axis=1)
     slides = np.any((length > 0.0) & (length > 0.9 * mu * contacts.normal_force))
     return (

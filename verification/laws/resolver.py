@@ -35,10 +35,12 @@ class Watched:
     """
 
     def __init__(self, resolver: Resolver, note: Callable[[bytes], None] | None = None) -> None:
-        self.resolver, self.note = resolver, note
+        self.resolver = resolver
+        self.note = note
         self.suspects: list[tuple[ImpactCase, Floats]] = []
         self.calls: deque[bytes] = deque(maxlen=REMEMBERED)
-        self.changed, self.rounded = 0, 0
+        self.changed = 0
+        self.rounded = 0
 
     def __call__(self, *given: Any) -> Any:
         pickled = pickle.dumps(given)
@@ -53,7 +55,8 @@ class Watched:
 
     def forget(self) -> None:
         """Drop what belongs to the check: reports travel between processes."""
-        self.resolver, self.note = print, None
+        self.resolver = print
+        self.note = None
         self.calls.clear()
 
     def look_at(self, case: ImpactCase, v_plus: Floats) -> None:
@@ -76,7 +79,8 @@ def own_answer(resolver: Resolver, case: ImpactCase) -> tuple[Floats | ResolverF
     """
     known = case._answers.get(id(resolver))
     if known is None:
-        own, given = case.given(), case.given()
+        own = case.given()
+        given = case.given()
         velocity = _velocity(resolver, given, case)
         changed = sum(not np.array_equal(one, other) for one, other in zip(own, given, strict=True))
         known = case._answers[id(resolver)] = resolver, (velocity, changed)
@@ -138,7 +142,8 @@ def _velocity(
 
 
 # The correct resolver; the planted bugs are made from its parts.
-RANK_CUT, ROUNDING = 1e-10, 1e-12
+RANK_CUT = 1e-10
+ROUNDING = 1e-12
 
 
 def whitened(change: Callable[..., Floats]) -> Resolver:
@@ -177,7 +182,8 @@ def least_push(rows: Floats, target: Floats) -> Floats:
     A row joins the active set only if it reduces the remainder by more than rounding. scipy 1.17's
     `nnls` has no such threshold: for a p that is 0 up to 1e-17 it returned impulses of 0.1.
     """
-    p, used = np.zeros(len(rows)), np.zeros(len(rows), dtype=bool)
+    p = np.zeros(len(rows))
+    used = np.zeros(len(rows), dtype=bool)
     length = np.linalg.norm(rows, axis=1)
     unit = np.divide(rows, length[:, None], out=np.zeros_like(rows), where=length[:, None] > 0.0)
     least = ROUNDING * float(np.linalg.norm(target))

@@ -111,7 +111,8 @@ def _drawn(
         "bodies": bodies,
         "walls": walls(rng),
     }
-    values["duration"], values["integrator"] = steps / values["rate"], "semi_implicit_euler"
+    values["duration"] = steps / values["rate"]
+    values["integrator"] = "semi_implicit_euler"
     if rng.random() < gravity[0]:
         values["gravity"] = gravity[1]
     values["contact"] = _contact(rng, least_mass, 1.0 / values["rate"])
@@ -130,7 +131,8 @@ def _bodies(rng: np.random.Generator) -> list[Values]:
 
 
 def _free_body(rng: np.random.Generator, k: int, cell: tuple[float, float]) -> Values:
-    mass, size = round(10.0 ** rng.uniform(-1.5, 0.7), 4), round(rng.uniform(0.03, 0.09), 4)
+    mass = round(10.0 ** rng.uniform(-1.5, 0.7), 4)
+    size = round(rng.uniform(0.03, 0.09), 4)
     shape: Values = {"kind": "circle", "radius": size}
     if rng.random() < 0.5:
         shape = {"kind": "box", "size": [2.0 * size, round(rng.uniform(0.03, 0.12), 4)]}
@@ -151,7 +153,9 @@ def _linkage(rng: np.random.Generator, in_space: bool = False) -> list[Values]:
     """
     links: list[Values] = []
     for k in range(int(rng.integers(1, 4))):
-        length, mass, zero = 0.09, round(10.0 ** rng.uniform(-1.0, 0.3), 4), [0.0] * (1 + in_space)
+        length = 0.09
+        mass = round(10.0 ** rng.uniform(-1.0, 0.3), 4)
+        zero = [0.0] * (1 + in_space)
         across = mass * (length**2 + 0.02**2) / 12.0
         link: Values = {
             "name": f"link_{k}",
@@ -246,7 +250,8 @@ def _add_hand(
     }
     if not through[0] <= rng.random() < through[1]:
         return
-    body, turning = values["bodies"][0], np.ravel(values["bodies"][0]["inertia"])
+    body = values["bodies"][0]
+    turning = np.ravel(values["bodies"][0]["inertia"])
     inertia = np.array([body["mass"]] * (len(limits) - len(turning)) + turning.tolist())
     rate = 0.05 * values["rate"]  # of the coupling [1/s]: slow beside the step
     values["couplings"] = {
@@ -324,7 +329,8 @@ def _stack(rng: np.random.Generator) -> list[Values]:
     height = below["shapes"][0]["size"][2]
     shape = above["shapes"][0]
     half = shape["radius"] if shape["kind"] == "sphere" else 0.5 * shape["size"][2]
-    low, high = -ROOM + 0.5 * height - 1e-6, -ROOM + height + half - 2e-6
+    low = -ROOM + 0.5 * height - 1e-6
+    high = -ROOM + height + half - 2e-6
     return [
         below | {"position": [0.0, 0.0, low, 0.0, 0.0, 0.0, 1.0]},
         above | {"position": [0.003, -0.002, high, 0.0, 0.0, 0.0, 1.0]},

@@ -20,11 +20,18 @@ from verification.laws.trajectories import TRAJECTORY_LAWS, Trajectory
 from verification.methods import gram_pinv
 from verification.table import HOLDS, Row, Table
 
-KIT_IMPACTS, FAULT_IMPACTS = 1500, 400
+KIT_IMPACTS = 1500
+FAULT_IMPACTS = 400
 # cases per law, per simulating law, with a fault
-ENGINE_CASES, SIMULATED, FAULT_CASES = 300, 20, 60
-TRAJECTORIES, IN_SPACE, TRAJECTORY_STEPS = 60, 40, 300
-COUNTER_IMPACTS, SEARCH = 500, 300  # for the search of a counterexample
+ENGINE_CASES = 300
+SIMULATED = 20
+FAULT_CASES = 60
+TRAJECTORIES = 60
+IN_SPACE = 40
+TRAJECTORY_STEPS = 300
+# for the search of a counterexample
+COUNTER_IMPACTS = 500
+SEARCH = 300
 CAUGHT = "fault caught"
 
 
@@ -46,7 +53,8 @@ def _impact_law(study: Study, name: str) -> Row:
     report = study.once(
         "kit", lambda: check_passivity(resolve_impact, impacts=KIT_IMPACTS, search=0)
     )
-    verdict, fault = report.verdict(name), PLANTED_BUGS[name]
+    verdict = report.verdict(name)
+    fault = PLANTED_BUGS[name]
     if verdict.error is not None:
         raise verdict.error
     broken = check_passivity(fault.make(), impacts=FAULT_IMPACTS, search=0)
@@ -75,14 +83,16 @@ def _trajectories(study: Study) -> tuple[list[SceneCase], list[Trajectory], list
         study.failures,
         lambda case: f"trajectory of random scene {case[0]}",
     )
-    every, finite = list(runs), TRAJECTORY_LAWS["finite"]
+    every = list(runs)
+    finite = TRAJECTORY_LAWS["finite"]
     sound = attempt("finite", lambda: [(one, finite.check(one)) for one in every], []) or ()
     return scenes, every, [one for one, found in sound if found is None or found.passed] or every
 
 
 def _trajectory_law(study: Study, name: str) -> Row:
     scenes, every, whole = study.once("trajectories", lambda: _trajectories(study))
-    law, count = TRAJECTORY_LAWS[name], LawCount(name)
+    law = TRAJECTORY_LAWS[name]
+    count = LawCount(name)
     for one in every if name == "finite" else whole:
         if (found := law.check(one)) is not None:
             count.add(found)

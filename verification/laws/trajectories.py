@@ -80,7 +80,8 @@ class Trajectory:
     def masses(self) -> Floats:
         """M at the beginning of each step, (n, d, d); a constant M is computed once and
         broadcast."""
-        mechanism, q = self.system.mechanism, self.run.q[:-1]
+        mechanism = self.system.mechanism
+        q = self.run.q[:-1]
         if mechanism.has_constant_mass_matrix:
             one = mechanism.mass_matrix(q[0])
             return np.asarray(np.broadcast_to(one, (len(q), *one.shape)))
@@ -97,14 +98,16 @@ class Trajectory:
     def cut(self) -> NDArray[np.bool_]:
         """Whether impacts happen within each step (n,): it then has more than one velocity, and its
         forces are means."""
-        impacts, found = self.run.impacts, np.zeros(self.run.steps, np.bool_)
+        impacts = self.run.impacts
+        found = np.zeros(self.run.steps, np.bool_)
         found[impacts.step[impacts.time > impacts.step * self.run.dt]] = True
         return found
 
     @cached_property
     def v_struck(self) -> Floats:
         """Velocity (n, d) after the impulse of each step and before its forces."""
-        v, impulse = self.run.v[:-1].copy(), self.run.impulse
+        v = self.run.v[:-1].copy()
+        impulse = self.run.impulse
         struck = np.flatnonzero(np.any(impulse, axis=1))
         if len(struck):
             v[struck] += np.linalg.solve(self.masses[struck], impulse[struck][:, :, None])[:, :, 0]
@@ -113,7 +116,8 @@ class Trajectory:
     @cached_property
     def bias_and_gravity(self) -> Floats:
         """B + G (n, d) of (1) at the beginning of each step, after the impulse."""
-        system, q = self.system, self.run.q[:-1]
+        system = self.system
+        q = self.run.q[:-1]
         out = np.zeros_like(self.v_struck)
         if system.mechanism.has_velocity_terms:
             out += system.mechanism.biases(q, self.v_struck)
@@ -125,7 +129,8 @@ class Trajectory:
     def turns_over(self) -> bool:
         """Whether a spatial body may turn by half a turn or more in a step, so that its
         displacement is ambiguous."""
-        run, mechanism = self.run, self.system.mechanism
+        run = self.run
+        mechanism = self.system.mechanism
         return bool(
             mechanism.nq != mechanism.nv
             and run.dt * np.max(np.abs(run.v[1:]), initial=0.0) >= HALF_TURN
@@ -134,7 +139,8 @@ class Trajectory:
     @cached_property
     def displacements(self) -> Floats:
         """Displacement (n, d) of each step."""
-        mechanism, q = self.system.mechanism, self.run.q
+        mechanism = self.system.mechanism
+        q = self.run.q
         if mechanism.nq == mechanism.nv:
             return np.asarray(np.diff(q, axis=0))
         return np.array([mechanism.difference(a, b) for a, b in zip(q[:-1], q[1:], strict=True)])
@@ -159,7 +165,8 @@ def state_stays_finite(trajectory: Trajectory) -> Found:
 def impacts_take_energy(trajectory: Trajectory) -> Found:
     """Theorem 2: largest energy gain over its bound 10 d ε √κ(M), for M restricted to the trees
     with an impulse."""
-    impacts, ratios = trajectory.run.impacts, []
+    impacts = trajectory.run.impacts
+    ratios = []
     for k, whole in enumerate(trajectory.struck_masses):
         trees = [
             np.arange(a, b)
@@ -184,7 +191,8 @@ def impulses_explain_impacts(trajectory: Trajectory) -> Found:
     Solving with M, scaled to a unit diagonal, causes an error ε κ of the scaled matrix; κ is
     computed here.
     """
-    impacts, run = trajectory.run.impacts, trajectory.run
+    impacts = trajectory.run.impacts
+    run = trajectory.run
     if not len(impacts.step):
         return None
     masses = trajectory.struck_masses
@@ -213,7 +221,8 @@ def forces_explain_motion(trajectory: Trajectory) -> Found:
     """
     if not trajectory.is_explained or trajectory.implicit:
         return None
-    run, masses = trajectory.run, trajectory.masses
+    run = trajectory.run
+    masses = trajectory.masses
     changed = np.einsum("kij,kj->ki", masses, run.v[1:] - trajectory.v_struck)
     forces = (run.hand_force, run.coupling_force, run.penalty_force, run.friction_force)
     pushed = run.dt * (sum(forces) - trajectory.bias_and_gravity)
@@ -230,7 +239,8 @@ def velocity_moves_configuration(trajectory: Trajectory) -> Found:
     are no vectors."""
     if not trajectory.is_explained or trajectory.cut.any():
         return None
-    run, mechanism = trajectory.run, trajectory.system.mechanism
+    run = trajectory.run
+    mechanism = trajectory.system.mechanism
     if mechanism.nq == mechanism.nv:
         moved = run.q[:-1] + run.dt * run.v[1:]
     else:
@@ -249,7 +259,8 @@ def ledger_closes(trajectory: Trajectory) -> Found:
     Each work is the force times the displacement, and the impact losses follow from the velocities.
     With a constant mass matrix the integrator's error is known exactly: see `_residuals`.
     """
-    run, system = trajectory.run, trajectory.system
+    run = trajectory.run
+    system = trajectory.system
     if not trajectory.is_explained or not run.energy:
         return None
     works = {
@@ -264,8 +275,10 @@ def ledger_closes(trajectory: Trajectory) -> Found:
         + np.max(np.abs(potential))
         + sum(np.sum(np.abs(work)) for work in works.values())
     )
-    impacts, losses = run.impacts, np.zeros(run.steps)
-    v, dv = impacts.v_plus + impacts.v_minus, impacts.v_plus - impacts.v_minus
+    impacts = run.impacts
+    losses = np.zeros(run.steps)
+    v = impacts.v_plus + impacts.v_minus
+    dv = impacts.v_plus - impacts.v_minus
     np.add.at(
         losses,
         impacts.step,
@@ -311,11 +324,13 @@ def contacts_push_by_the_penalty(trajectory: Trajectory) -> Found:
 
     A contact pulls only if the scene selects the `printed` penalty; otherwise a pull is infinite.
     """
-    run, contacts = trajectory.run, trajectory.run.contacts
+    run = trajectory.run
+    contacts = trajectory.run.contacts
     if not trajectory.by_the_engine or trajectory.implicit or not len(contacts.gap):
         return None
     constants = run.scene_resolved["contact"]
-    K, B = constants["stiffness"], constants["damping"]
+    K = constants["stiffness"]
+    B = constants["damping"]
     force = -K * contacts.gap - B * contacts.normal_velocity
     if constants["penalty"] == "clamped":
         force = np.maximum(force, 0.0)
@@ -335,7 +350,8 @@ def friction_stays_in_its_cone(trajectory: Trajectory) -> Found:
     Subtracting v_n from the velocity rounds v_t by ε |v_n|, and (6) divides by v_threshold or more;
     the tolerance covers this error.
     """
-    run, contacts = trajectory.run, trajectory.run.contacts
+    run = trajectory.run
+    contacts = trajectory.run.contacts
     if not trajectory.by_the_engine or trajectory.implicit or not len(contacts.gap):
         return None
     most = trajectory.system.scene.largest_friction * np.maximum(contacts.normal_force, 0.0)

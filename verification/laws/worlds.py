@@ -37,7 +37,8 @@ def velocities_move_the_bodies(trajectory: Trajectory) -> Found:
     run = trajectory.run
     if trajectory.turns_over:
         return None
-    before, after = run.v[:-1], run.v[1:]
+    before = run.v[:-1]
+    after = run.v[1:]
     apart = norm(trajectory.displacements / run.dt - 0.5 * (before + after)) - 0.5 * norm(
         after - before
     )
@@ -51,7 +52,8 @@ def energy_is_not_made(trajectory: Trajectory) -> Found:
     run = trajectory.run
     if run.coupling == "unilateral" or "potential" not in run.energy:
         return None
-    kinetic, potential = run.energy["kinetic"], run.energy["potential"]
+    kinetic = run.energy["kinetic"]
+    potential = run.energy["potential"]
     size = float(np.max(kinetic) + np.ptp(potential) + np.max(np.abs(work_given(run))))
     return (float(np.max(risen(run)[1:])) / size, CLOSE) if size > 0.0 else None
 

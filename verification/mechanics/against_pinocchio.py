@@ -53,7 +53,8 @@ WRITTEN_SIZES = (3, 8, 20)
 Pairs = list[tuple[Mechanism, PinocchioMechanism]]
 Pair = tuple[Any, Any]  # a quantity of ours, and of the reference
 
-TREES_SET, OTHERS = "random trees", "robots beside the checkout"
+TREES_SET = "random trees"
+OTHERS = "robots beside the checkout"
 _SETS = {
     TREES_SET: "random trees of up to 30 bodies",
     "joint kinds": "trees with one joint type each",
@@ -83,7 +84,8 @@ def robot_files() -> list[Path]:
 
 
 def _cases(study: Study) -> Iterator[Case]:
-    count, written = TREES[study.depth], WRITTEN[study.depth]
+    count = TREES[study.depth]
+    written = WRITTEN[study.depth]
     for n in TREE_SIZES:
         yield Case(
             TREES_SET, f"trees of {n}", "random", [SEED, n], partial(_trees, n, count, tuple(KINDS))
@@ -221,15 +223,22 @@ def compare(
     arm, and v x m v, which is zero but is computed from terms of the size of twice the kinetic
     energy. Point Jacobians are compared at a point one metre off each body's origin.
     """
-    m, p, dv = mechanism, reference, np.cos(np.arange(mechanism.nv))
-    (rotations, positions), (axes, origins, rows) = m.placements(q), p.bodies(q)
-    places, frames, points = list[Pair](), list[Pair](), list[Pair]()
+    m = mechanism
+    p = reference
+    dv = np.cos(np.arange(mechanism.nv))
+    (rotations, positions) = m.placements(q)
+    (axes, origins, rows) = p.bodies(q)
+    places = list[Pair]()
+    frames = list[Pair]()
+    points = list[Pair]()
     for b, name in enumerate(m.names):
-        k, point = p.index(name), positions[b] + (0.6, 0.0, -0.8)
+        k = p.index(name)
+        point = positions[b] + (0.6, 0.0, -0.8)
         places += [(rotations[b], axes[k]), (positions[b], origins[k])]
         frames += [(m.frame_jacobian(q, b), rows[k])]
         points += [(m.point_jacobian(q, b, point), at_lever(rows[k], point - origins[k]))]
-    apart, lifted = relative_difference, float(np.linalg.norm(gravity)) * _spread(m, q)
+    apart = relative_difference
+    lifted = float(np.linalg.norm(gravity)) * _spread(m, q)
     return {
         "mass matrix": apart([(m.mass_matrix(q), p.mass_matrix(q))]),
         "placements and Jacobians": max(map(apart, (places, frames, points))),
@@ -288,22 +297,25 @@ AGAINST_PINOCCHIO = Check(
     digits=2,
 )
 
-_EASY, _HARDEST = (
-    10.0,
-    1e6,
-)  # condition numbers κ(A): up to the first, plain rounding; beyond the second, not compared
+# condition numbers κ(A): up to the first, plain rounding; beyond the second, not compared
+_EASY = 10.0
+_HARDEST = 1e6
 
 
 def _impulse_dynamics(_: Study, impacts: int) -> Iterator[Row]:
     """Yield the largest differences of v⁺ between the engine and Pinocchio's impulseDynamics,
     kinetic metric."""
-    rng, shares, easy = np.random.default_rng(2), list[float](), list[float]()
+    rng = np.random.default_rng(2)
+    shares = list[float]()
+    easy = list[float]()
     for _impact in range(impacts):
         d = int(rng.integers(1, 13))
         c = int(rng.integers(1, d + 1))
         root = rng.normal(size=(d, d))
         M = root @ root.T + 10.0 ** rng.uniform(-2, 1) * np.eye(d)
-        J, v, e = rng.normal(size=(c, d)), rng.normal(size=d), float(rng.uniform(-1, 1))
+        J = rng.normal(size=(c, d))
+        v = rng.normal(size=d)
+        e = float(rng.uniform(-1, 1))
         L = np.linalg.cholesky(M)
         condition = float(np.linalg.cond(np.linalg.solve(L, J.T)))
         if condition > _HARDEST:

@@ -33,7 +33,8 @@ def _condition(mass: Floats) -> float:
 def _definite(study: Study, joints: int) -> Row:
     count = MATRICES[study.depth]
     rng = np.random.default_rng([SEED, joints, 1])
-    conditions, least = [], []
+    conditions = []
+    least = []
     for _ in range(count):
         mechanism = random_mechanism(rng, joints)
         mass = mechanism.mass_matrix(random_state(rng, mechanism)[0])

@@ -16,7 +16,8 @@ from verification.finding import Part
 from verification.ordinary.scenes import CASES, FAMILIES, Motion
 from verification.table import Row, Table
 
-OURS, THEIRS = "IAPB", "MuJoCo"
+OURS = "IAPB"
+THEIRS = "MuJoCo"
 WORLDS = {OURS: "IAPB", THEIRS: "mujoco"}
 
 

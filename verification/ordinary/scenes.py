@@ -257,11 +257,15 @@ def free_motion(name: str) -> Motion:
     """Return the true motion of a case without contact, at a hundred instants."""
     checked = scene_kind(CASES[name].scene).model_validate(CASES[name].scene)
     mechanics = model_of(mechanism_of(checked))
-    pin, model, state, nq = mechanics.pin, mechanics.model, mechanics.data, mechanics.nq
+    pin = mechanics.pin
+    model = mechanics.model
+    state = mechanics.data
+    nq = mechanics.nq
     model.gravity.linear = np.array([*(checked.gravity or ()), 0.0, 0.0, 0.0][:3])
 
     def rates(_: float, y: Floats) -> Floats:
-        q, v = mechanics.normalize(y[:nq]), y[nq:]
+        q = mechanics.normalize(y[:nq])
+        v = y[nq:]
         return np.concatenate(
             [mechanics.rate(q, v), pin.aba(model, state, q, v, np.zeros(mechanics.nv))]
         )
@@ -341,7 +345,9 @@ def spinning(
     )
 
 
-BRICK, PLATE, ROD = (0.1, 0.16, 0.24), (0.2, 0.3, 0.002), (0.4, 0.01, 0.02)
+BRICK = (0.1, 0.16, 0.24)
+PLATE = (0.2, 0.3, 0.002)
+ROD = (0.4, 0.01, 0.02)
 add_free("spin_sphere_1", spinning((0.1,), 1.0), 0.1)
 add_free("spin_sphere_100", spinning((0.1,), 100.0, drift=3.0), 0.1, tolerance=1e-3)
 add_free("spin_box_1", spinning(BRICK, 1.0, duration=3.0), 0.1)
@@ -422,10 +428,9 @@ def rolled(v: float, w: float, mu: float, time: float, share: float = 0.4) -> fl
 R = 0.03
 CRATE = box("crate", (0.4, 0.4), 40.0, (-1.0, 1.2, 0))
 TILT = math.radians(20.0)
-ALONG, OUT = (
-    (math.cos(TILT), -math.sin(TILT)),
-    (math.sin(TILT), math.cos(TILT)),
-)  # down the slope, out of it
+# down the slope, out of it
+ALONG = (math.cos(TILT), -math.sin(TILT))
+OUT = (math.sin(TILT), math.cos(TILT))
 SLOPE = {"name": "slope", "kind": "half_plane", "point": [0, 0], "normal": list(OUT)}
 SLOPE_3D = {
     "name": "slope",
@@ -541,7 +546,8 @@ close_family("balls that roll and bounce")
 
 def tipped(w: float, h: float, speed: float, time: float) -> float:
     """Return the angle of a box that turns about its lower edge without sliding [rad]."""
-    half, lean = math.hypot(w, h) / 2, math.atan2(w, h)
+    half = math.hypot(w, h) / 2
+    lean = math.atan2(w, h)
     about = (w * w + h * h) / 3
     found = solve_ivp(
         lambda _, y: [y[1], G * half * math.sin(y[0] - lean) / about],
@@ -728,7 +734,8 @@ add_standing(
     ),
     0.5,
 )
-SIN, COS = math.sin(math.radians(5)), math.cos(math.radians(5))
+SIN = math.sin(math.radians(5))
+COS = math.cos(math.radians(5))
 NARROW = [
     {"name": f"side_{i}", "kind": "half_plane", "point": [0, 0], "normal": [side * COS, SIN]}
     for i, side in enumerate((1, -1))
@@ -780,8 +787,10 @@ def wedge(mu: float, mass: float, duration: float) -> Values:
 
 def driven(mu: float, mass: float) -> float:
     """Return the acceleration of the wedge [m/s²] where all its faces and the blocks slide."""
-    s, c = math.sin(math.radians(15.0)), math.cos(math.radians(15.0))
-    down, out = 2 * (s + mu * c), c - mu * s - mu * (s + mu * c)
+    s = math.sin(math.radians(15.0))
+    c = math.cos(math.radians(15.0))
+    down = 2 * (s + mu * c)
+    out = c - mu * s - mu * (s + mu * c)
     # 1 kg · a = load − down N,  mass a tan 15° = out N − μ mass g
     return float(np.linalg.solve([[1.0, down], [mass * SHARP, -out]], [G + 5.0, -mu * mass * G])[0])
 
@@ -816,11 +825,14 @@ def peg(mu: float) -> Values:
 
     The peg is 20 mm wide and 60 mm long, the hole 20.2 mm wide and 40 mm deep, its mouth at y = 0.
     """
-    w, hole, deep = 0.02, 0.0202, 0.008
+    w = 0.02
+    hole = 0.0202
+    deep = 0.008
     # The lower left corner touches the left side, the right flank the edge of the mouth: hole cos t
     # − deep sin t = w
     t = 2 * math.atan2(math.sqrt(deep**2 + hole**2 - w**2) - deep, w + hole)
-    x, y = w / 2 * math.cos(t) + 0.03 * math.sin(t), -w / 2 * math.sin(t) + 0.03 * math.cos(t)
+    x = w / 2 * math.cos(t) + 0.03 * math.sin(t)
+    y = -w / 2 * math.sin(t) + 0.03 * math.cos(t)
     sides = [
         {
             "name": name,
@@ -850,13 +862,16 @@ add(
     0.032,
     "9 mm < 8 mm/2μ: reaches the end",
 )
-LENGTH, TIP = 1.0, 0.005  # a ladder: a rod with round ends
+# a ladder: a rod with round ends
+LENGTH = 1.0
+TIP = 0.005
 
 
 def ladder(mu: float, lean: float, duration: float) -> Values:
     """Return a ladder that leans on a wall at an angle from the floor [rad]; its foot is at
     positive x."""
-    x, y = TIP + LENGTH / 2 * math.cos(lean), TIP + LENGTH / 2 * math.sin(lean)
+    x = TIP + LENGTH / 2 * math.cos(lean)
+    y = TIP + LENGTH / 2 * math.sin(lean)
     ends = [{"kind": "circle", "radius": TIP, "center": [end * LENGTH / 2, 0.0]} for end in (-1, 1)]
     rod = {
         "name": "ladder",
@@ -874,7 +889,9 @@ def slipped(mu: float, lean: float, time: float) -> float:
     """Return the angle from the floor of a ladder that slips at both ends [rad], by DOP853."""
 
     def rates(_: float, y: Floats) -> list[float]:
-        c, s, half = math.cos(y[0]), math.sin(y[0]), LENGTH / 2
+        c = math.cos(y[0])
+        s = math.sin(y[0])
+        half = LENGTH / 2
         # unknown: angular acceleration, force of the floor, force of the wall, each by mass;
         # inertia = half²/3
         rows = [
@@ -1113,7 +1130,9 @@ add(
 def spin_of_landing(w: float, h: float, mu: float, e: float, speed: float) -> float:
     """Return ω⁺ of a box that lands flat and slides on: its leading corner slips, the other opens
     [rad/s]."""
-    arm, about = w / 2 - mu * h / 2, (w * w + h * h) / 12  # per unit of mass
+    # per unit of mass
+    arm = w / 2 - mu * h / 2
+    about = (w * w + h * h) / 12
     return (1 + e) * speed / (1 + w / 2 * arm / about) * arm / about
 
 
@@ -1133,7 +1152,9 @@ add(
     "tips",
     tolerance=0.02,
 )
-LEAN, FAST = 0.2, math.sqrt(4 + 4 / 3 * G * math.sin(0.2) * 0.02)  # speed after 0.02 m
+# speed after 0.02 m
+LEAN = 0.2
+FAST = math.sqrt(4 + 4 / 3 * G * math.sin(0.2) * 0.02)
 add(
     "disc_rolls_into_wall",
     scene(
@@ -1228,7 +1249,8 @@ def leaving(motion: Motion) -> Floats:
 def against_a_wall(ratio: float) -> tuple[float, float]:
     """Return the velocities of a heavy ball (1 m/s at the start) and of a light one between it and
     a wall at +x."""
-    heavy, light = 1.0, 0.0
+    heavy = 1.0
+    light = 0.0
     while heavy > light or light > 0.0:
         if heavy > light:
             common = (ratio * heavy + light) / (ratio + 1.0)

@@ -24,7 +24,8 @@ from verification.ordinary.judge import THEIRS, WORLDS, is_installed
 from verification.table import Row, Table
 
 G = 9.81
-WIDTH, HEIGHT = 0.1, 0.06
+WIDTH = 0.1
+HEIGHT = 0.06
 CORNERS = 0.5 * np.array([[WIDTH, HEIGHT], [-WIDTH, HEIGHT], [-WIDTH, -HEIGHT], [WIDTH, -HEIGHT]])
 INERTIA = (WIDTH**2 + HEIGHT**2) / 12.0
 FLOOR = {"name": "floor", "kind": "half_plane", "point": [0, 0], "normal": [0, 1]}
@@ -83,7 +84,10 @@ def tossed(
     state: Floats, restitution: float, friction: float, seconds: float
 ) -> tuple[Floats, int]:
     """Return where the box is in the end, and the number of its impacts."""
-    q, v, left, impacts = state[:3].copy(), state[3:].copy(), seconds, 0
+    q = state[:3].copy()
+    v = state[3:].copy()
+    left = seconds
+    impacts = 0
     while True:
         t, corner = _next_touch(q, v, left)
         q = q + t * v - [0.0, 0.5 * G * t * t, 0.0]
@@ -92,7 +96,8 @@ def tossed(
         if corner < 0:
             return q, impacts
         impacts += 1
-        c, s = math.cos(q[2]), math.sin(q[2])
+        c = math.cos(q[2])
+        s = math.sin(q[2])
         row = np.array([0.0, 1.0, c * CORNERS[corner, 0] - s * CORNERS[corner, 1]])
         along = np.array([1.0, 0.0, -s * CORNERS[corner, 0] - c * CORNERS[corner, 1]])
         v = v + coulomb(np.stack([row, along]), v, [1.0, 1.0, INERTIA], restitution, friction)
@@ -112,7 +117,8 @@ def _next_touch(q: Floats, v: Floats, left: float) -> tuple[float, int]:
 
 def heights(q: Floats, v: Floats, t: float) -> Floats:
     """Return the heights of the four corners after t seconds of flight."""
-    y, angle = q[1] + t * v[1] - 0.5 * G * t * t, q[2] + t * v[2]
+    y = q[1] + t * v[1] - 0.5 * G * t * t
+    angle = q[2] + t * v[2]
     return np.asarray(y + math.sin(angle) * CORNERS[:, 0] + math.cos(angle) * CORNERS[:, 1])
 
 
@@ -128,7 +134,8 @@ def coulomb(
     rows : (2, d) of the normal and the tangent; mass : (d,) diagonal of M
     """
     moved = rows / mass
-    inverse, before = rows @ moved.T, rows @ v
+    inverse = rows @ moved.T
+    before = rows @ v
     due = -np.array([(1.0 + restitution) * before[0], before[1]])
     normal, side = np.linalg.solve(inverse, due)
     if abs(side) <= friction * normal:
@@ -144,7 +151,8 @@ def coulomb(
 def tosses(depth: str) -> Iterator[TimedMotion]:
     """Yield tosses from random states, without friction."""
     rng = np.random.default_rng(2)
-    least, most = [0.0, 0.1, 0.0, -1.0, -1.0, -10.0], [0.0, 0.4, 6.28, 1.0, 1.0, 10.0]
+    least = [0.0, 0.1, 0.0, -1.0, -1.0, -10.0]
+    most = [0.0, 0.4, 6.28, 1.0, 1.0, 10.0]
     for _ in range(TOSSES[depth]):
         yield toss(rng.uniform(least, most), 0.6, 0.0, 0.4)
 
@@ -152,9 +160,14 @@ def tosses(depth: str) -> Iterator[TimedMotion]:
 def bounce(depth: str) -> Iterator[TimedMotion]:
     """Yield a disc that bounces with spin and friction: parabolas of known length, Coulomb's law at
     each end."""
-    radius, height, e, mu, seconds = 0.1, 0.3, 0.8, 0.3, 1.6
+    radius = 0.1
+    height = 0.3
+    e = 0.8
+    mu = 0.3
+    seconds = 1.6
     inertia = 0.5 * radius**2
-    q, v = np.array([0.0, radius + height, 0.0]), np.array([1.0, 0.0, 20.0])
+    q = np.array([0.0, radius + height, 0.0])
+    v = np.array([1.0, 0.0, 20.0])
     scene = {
         "name": "bounce",
         "duration": seconds,
@@ -163,7 +176,8 @@ def bounce(depth: str) -> Iterator[TimedMotion]:
         "walls": [FLOOR],
         "contact": {"restitution": e, "friction": mu},
     }
-    rows, left = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, radius]]), seconds
+    rows = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, radius]])
+    left = seconds
     while True:
         above = q[1] - radius
         t = min((v[1] + math.sqrt(v[1] ** 2 + 2.0 * G * above)) / G, left)
@@ -197,7 +211,9 @@ def _disc(q: Floats, v: Floats, radius: float, inertia: float) -> dict[str, Any]
 
 def cradle(depth: str) -> Iterator[TimedMotion]:
     """Yield five elastic balls with gaps: the blow passes through them, one after another."""
-    gap, pitch, seconds = 1.13e-3, 0.1, 0.064
+    gap = 1.13e-3
+    pitch = 0.1
+    seconds = 0.064
     places = (pitch + gap) * np.arange(5)
     ball = {"joint": "prismatic", "axis": [1, 0], "mass": 1.0}
     shape = {"kind": "circle", "radius": 0.5 * pitch}
@@ -224,7 +240,10 @@ def cradle(depth: str) -> Iterator[TimedMotion]:
 
 def stops(depth: str) -> Iterator[TimedMotion]:
     """Yield an arm that turns to and fro between two elastic stops."""
-    speed, low, high, seconds = 3.7, -0.4, 0.6, 1.6
+    speed = 3.7
+    low = -0.4
+    high = 0.6
+    seconds = 1.6
     arm = {
         "name": "arm",
         "joint": "revolute",

@@ -55,9 +55,12 @@ class CoupledLoop:
 
     def follow(self, x: Floats, v: Floats) -> Floats:
         """Return the actuator forces (n, d) at readings (n, d) from the scene's start."""
-        port, (n, d) = self.simulation.port, x.shape
-        q, rate = np.tile(self._at_start, (n, 1)), np.zeros((n, len(port.device_v)))
-        q[:, :d], rate[:, :d] = x, v
+        port = self.simulation.port
+        (n, d) = x.shape
+        q = np.tile(self._at_start, (n, 1))
+        rate = np.zeros((n, len(port.device_v)))
+        q[:, :d] = x
+        rate[:, :d] = v
         return self.simulation.follow(q, rate)[:, :d]
 
     @cached_property

@@ -69,7 +69,8 @@ class BareDevice:
 
     def readings(self, positions: Floats) -> tuple[Floats, Floats]:
         """Return what the law reads at positions (n, d): x and v, each (n, d)."""
-        step, late = self.resolution, int(self.delay)
+        step = self.resolution
+        late = int(self.delay)
         sensed = np.round(positions / step) * step if step > 0.0 else positions.copy()
         if late:
             sensed = np.concatenate([np.repeat(sensed[:1], late, axis=0), sensed])[: len(sensed)]
@@ -135,7 +136,10 @@ class Port:
     """
 
     def __init__(self, law: Any, device: BareDevice, size: int) -> None:
-        self.law, self.device, self.size, self.calls = law, device, size, 0
+        self.law = law
+        self.device = device
+        self.size = size
+        self.calls = 0
         self.changed = 0  # motions in which the law changed its arguments
         self.play: Callable[..., Any] = self.answer  # a process of its own may take its place
 

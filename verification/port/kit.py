@@ -205,7 +205,8 @@ def check_force(
     if hasattr(law, "follow") and law.rate != device.rate:
         raise ArgumentError("rate", device.rate, f"{law.rate:g} Hz, the rate of the scene")
     at = start_of(start)
-    port, terms = Port(law, device, len(at)), Terms(stored, limit)
+    port = Port(law, device, len(at))
+    terms = Terms(stored, limit)
     goals = Goal(None, device.friction), Goal(device.damping, None)
     rng = np.random.default_rng(seed)
     with child_of(port.answer, call_limit, name_of(law)) as child:
@@ -244,11 +245,15 @@ class _Trial:
     def __init__(
         self, search: Search, laws: dict[str, Law], terms: Terms, child: Child | None
     ) -> None:
-        self.search, self.laws, self.terms, self.child = search, laws, terms, child
+        self.search = search
+        self.laws = laws
+        self.terms = terms
+        self.child = child
         self.verdicts = {
             name: ForceVerdict(name, statement=own.statement) for name, own in laws.items()
         }
-        self.damping, self.friction = 0.0, 0.0
+        self.damping = 0.0
+        self.friction = 0.0
         self.slow: float | None = None
         self.edge = np.empty((0, 2))
 
@@ -294,7 +299,8 @@ class _Trial:
 
     def edge_found(self) -> Floats:
         """Return points (b, f_c) of the edge, from 0 to beyond the device and its corner."""
-        search, device = self.search, self.search.device
+        search = self.search
+        device = self.search.device
         known = [one.motion for own in search.best.values() for one in own.values() if one.motion]
         corner = self.damping
         if not np.isfinite(corner):  # with twice the friction that a large damping leaves
@@ -327,12 +333,14 @@ class _Trial:
         if residual is None or (fault and name != "finite" and "finite" in self.laws):
             return
         if not verdict.add(residual) and verdict.motion is None:
-            verdict.motion, verdict.fault = motion, fault
+            verdict.motion = motion
+            verdict.fault = fault
 
     def counterexamples(self) -> Iterator[tuple[str, Motion, str, bool | None]]:
         """Yield each broken law with a small motion, what the law did, and whether a fresh law does
         it again."""
-        port, child = self.search.port, self.child
+        port = self.search.port
+        child = self.child
         for name, verdict in self.verdicts.items():
             if verdict.motion is None:
                 continue
@@ -354,7 +362,8 @@ class _Trial:
             fresh = None
             if child is not None:
                 child.restart()
-                own, port.play = port.play, child
+                own = port.play
+                port.play = child
                 fresh = hangs or breaks(motion, ends=np.inf)
                 port.play = own
             yield (
@@ -383,7 +392,8 @@ class _Trial:
 
     def cut(self, motion: Motion) -> Motion:
         """Return the first samples of a motion, until the hand has drawn energy."""
-        positions, device = motion.positions, self.search.device
+        positions = motion.positions
+        device = self.search.device
         sums = sums_of(positions, self.search.port.forces(positions), device.dt)
         drawn = sums.drawn(device.damping, device.friction) > self.terms.stored
         samples = 2 + int(np.argmax(drawn))

@@ -37,7 +37,8 @@ def _differing(a: Floats, b: Floats) -> float:
 def hand_gets_no_energy(motion: Motion, port: Port, terms: Terms) -> Found:
     """Largest E_n − stored, relative to the energy exchanged; the tolerance is the rounding of the
     sums."""
-    positions, device = motion.positions, port.device
+    positions = motion.positions
+    device = port.device
     forces = port.forces(positions)
     sums = sums_of(positions, forces, device.dt)
     drawn = float(sums.drawn(device.damping, device.friction).max(initial=0.0)) - terms.stored
@@ -126,7 +127,9 @@ def judge(name: str, law: Any, device: Any, motion: Motion, **terms: Any) -> Any
 
 def smaller_motions(motion: Motion) -> Iterator[Motion]:
     """Yield simpler motions: fewer rounds and samples, then fewer digits."""
-    lead, cycle, repeats = motion.lead, motion.cycle, motion.repeats
+    lead = motion.lead
+    cycle = motion.cycle
+    repeats = motion.repeats
     for fewer in (1, repeats // 10, repeats // 2, repeats - 1):
         if 0 < fewer < repeats and len(cycle):
             yield replace(motion, repeats=fewer)

@@ -135,7 +135,8 @@ class Search:
             forces = self.port.forces(positions)
         except ResolverFault as fault:
             if not self.fault:
-                self.fault, self.motion_of_fault = str(fault), Found(motion=motion)
+                self.fault = str(fault)
+                self.motion_of_fault = Found(motion=motion)
             return None
         with np.errstate(over="ignore"):
             largest = float(np.linalg.norm(forces, axis=1).max())
@@ -204,7 +205,8 @@ class Search:
 
     def steep(self) -> Iterator[tuple[str, Motion]]:
         """Scan lines slowly; yield chatter between the pairs of points that need most."""
-        size, reach = len(self.start), self.device.reach
+        size = len(self.start)
+        reach = self.device.reach
         lines = [*np.eye(size), *(self.direction() for _ in range(3 * (size - 1)))]
         lags = np.array([2**k for k in range(int(np.log2(SCAN)))])
         for line in lines:
@@ -271,7 +273,8 @@ class Search:
 
     def drawn(self) -> Iterator[tuple[str, Motion]]:
         """Yield random motions of every family for ever."""
-        k, slow = 0, self.fastest < np.inf
+        k = 0
+        slow = self.fastest < np.inf
         while True:
             k += 1
             yield f"turn {k % 4}", self.turn(k)
@@ -290,7 +293,8 @@ class Search:
         turns = 1 if self.smooth or p < 5 else int(self.rng.integers(1, 1 + p // 2))
         turns = turns if self.rng.random() < 0.3 else 1
         angle = 2.0 * np.pi * turns * np.arange(p)[:, None] / p + self.rng.uniform(0.0, 6.3)
-        middle, size = self.place(), self.size()
+        middle = self.place()
+        size = self.size()
         across = self.direction() * self.rng.choice([0.0, 1.0, self.rng.uniform()])
         shape = np.cos(angle) * self.direction() + np.sin(angle) * across
         size = min(size, self.room(middle))
@@ -302,7 +306,8 @@ class Search:
 
     def reversal(self, k: int) -> Motion:
         """Return a ramp to and fro of up to 12 samples each way, perhaps with rests at its ends."""
-        steps, rest = 1 + k % 12, int(self.rng.choice([0, 0, 1, 3]))
+        steps = 1 + k % 12
+        rest = int(self.rng.choice([0, 0, 1, 3]))
         up = np.linspace(-1.0, 1.0, steps + 1)
         shape = np.concatenate([up, np.repeat(up[-1:], rest), up[:0:-1], np.repeat(up[:1], rest)])
         return self.motion(self.place() + self.size() * shape[:, None] * self.direction())
@@ -316,7 +321,8 @@ class Search:
 
     def walk(self) -> Motion:
         """Return a random motion that does not close: a walk, rests and a sine."""
-        n, size = int(self.rng.integers(3, 150)), len(self.start)
+        n = int(self.rng.integers(3, 150))
+        size = len(self.start)
         moves = self.rng.normal(size=(n, size)) * (self.rng.random((n, 1)) < self.rng.uniform())
         sine = np.sin(self.rng.uniform(0.0, np.pi) * np.arange(n))[:, None] * self.direction()
         path = np.cumsum(moves, axis=0) / np.sqrt(n) + self.rng.choice([0.0, 1.0]) * sine
@@ -337,7 +343,8 @@ class Search:
     def corner(self, goal: Goal, one: Found) -> None:
         """Halve a pair of points as long as one half needs more: a step of the force is cornered."""
         for _ in range(HALVINGS):
-            family, needed = one.family, one.needed
+            family = one.family
+            needed = one.needed
             if one.motion is None or len(one.motion.cycle) != 2 or needed <= 0.0 or self.late:
                 return
             for half in halves_of(one.motion.cycle):
@@ -350,7 +357,10 @@ class Search:
         """Change a cycle at random, and keep what needs more."""
         if one.motion is None:
             return
-        best, value, step, failed = one.motion, one.needed, 0.3, 0
+        best = one.motion
+        value = one.needed
+        step = 0.3
+        failed = 0
         last = self.port.calls + self.effort * CLIMB
         for _ in range(tries):
             if self.late or failed > 30 or self.port.calls > last:
@@ -363,13 +373,17 @@ class Search:
             found = self.try_on(tried, one.family, (goal,))[0]
             if found > value:
                 failed = 0 if found > value * 1.0005 else failed + 1
-                best, value, step = tried, found, min(1.0, 1.6 * step)
+                best = tried
+                value = found
+                step = min(1.0, 1.6 * step)
             else:
-                failed, step = failed + 1, max(1e-3, 0.9 * step)
+                failed = failed + 1
+                step = max(1e-3, 0.9 * step)
 
     def changed(self, cycle: Floats, step: float) -> Floats:
         """Return a cycle with one random change of a relative size."""
-        rng, p = self.rng, len(cycle)
+        rng = self.rng
+        p = len(cycle)
         middle = cycle.mean(axis=0)
         spread = np.linalg.norm(cycle - middle, axis=1).max()
         kind = int(rng.integers(6))
@@ -384,7 +398,8 @@ class Search:
         if kind == 3:
             other = self.shortest if self.fastest < np.inf else 2
             rounds = int(rng.choice([1, 1, 2, 3])) if p < 40 and not self.smooth else 1
-            p, cycle = p * rounds, np.tile(cycle, (rounds, 1))
+            p = p * rounds
+            cycle = np.tile(cycle, (rounds, 1))
             longer = rng.choice([p // 2, p - 1, p + 1, round(p * 1.2), round(p / 1.2), 2 * p])
             return resampled(cycle, int(np.clip(longer, other, SLOWEST)), self.smooth)
         if kind == 4 or self.smooth:

@@ -50,7 +50,8 @@ class Text:
     """The formulas of one block, over SymPy's symbols."""
 
     def __init__(self, block: Block) -> None:
-        self.shapes, abbreviations = block.shapes, dict(block.abbreviations)
+        self.shapes = block.shapes
+        abbreviations = dict(block.abbreviations)
         self.codes = {
             name: f"x{number}" for number, name in enumerate((*self.shapes, *abbreviations))
         }
@@ -78,7 +79,8 @@ class Text:
     def relation(self, formula: str) -> Relation:
         left, sign, right = re.split(r"([=≠≤≥⪯⪰≻])", formula)
         low, high = (right, left) if sign in "=≠≥⪰≻" else (left, right)
-        value, sign = self.read(high) - self.read(low), {"≤": "≥", "⪯": "⪰"}.get(sign, sign)
+        value = self.read(high) - self.read(low)
+        sign = {"≤": "≥", "⪯": "⪰"}.get(sign, sign)
         shape = self.shape(value)
         if not shape or (sign in "⪰≻" and shape[0] != shape[1]):
             raise ArgumentError("formula", formula, "fitting sizes for SymPy, square for ⪰ and ≻")
@@ -105,7 +107,8 @@ class Text:
         """Raise ArgumentError unless the formula defines a letter that is not in `taken`; add its
         letters."""
         left, sign, right = re.split(r"([=≠≤≥⪯⪰≻])", formula)
-        letter, value = self.read(left), self.read(right)
+        letter = self.read(left)
+        value = self.read(right)
         used = taken | value.free_symbols
         scalar = letter.is_commutative and not self.is_number(value)
         if sign != "=" or not letter.is_Symbol or letter in used or scalar:
@@ -151,7 +154,8 @@ def refusal(
         if entry.key in ("lemma", "show")
     ]
     for (entry, rule), lines in zip(steps, certificates, strict=True):
-        claim, name = text.relation(entry.formula), entry.words or entry.formula
+        claim = text.relation(entry.formula)
+        name = entry.words or entry.formula
         if rule and rule[0] in ("cancelling", "dividing", "dominating"):
             if not any(
                 _follows(rule[0], text, claim, *both) for both in product(known, (*known, None))
@@ -260,7 +264,9 @@ def _follows(
 ) -> bool:
     """Whether the claim follows by the rule from `source` (a square or product) and the sign of
     `other`."""
-    x, value, kind = claim.value, source.value, other and other.relation
+    x = claim.value
+    value = source.value
+    kind = other and other.relation
     core = other.value if other else sympy.Integer(1)
     if (
         rule == "cancelling"

@@ -23,7 +23,10 @@ from verification.proofs.statement import Statement
 
 Comparisons = tuple[Comparison, ...]
 Twins = tuple[tuple[str, Comparison, str], ...]  # title, false comparison, note
-CASES, SEED, LARGEST = 40, 20050301, 4  # exact_instances
+# exact_instances
+CASES = 40
+SEED = 20050301
+LARGEST = 4
 SIZE = 2.0**-28  # distance of the second row from the direction of the first in fp_gram_pinv
 
 
@@ -53,16 +56,15 @@ def erratum_rank() -> tuple[Comparisons, Twins]:
 def erratum_spreading() -> tuple[Comparisons, Twins]:
     """A spread impulse, step by step; each step applies Newton's law anew: 2 kg, −0.1 m/s, e = 1/2,
     15 N, 512 Hz."""
-    mass, speed, e, most, steps = (
-        Fraction(2),
-        Fraction(-1, 10),
-        Fraction(1, 2),
-        Fraction(15, 512),
-        0,
-    )
+    mass = Fraction(2)
+    speed = Fraction(-1, 10)
+    e = Fraction(1, 2)
+    most = Fraction(15, 512)
+    steps = 0
     while speed < 0:
         impulse = min(wanted := -(1 + e) * mass * speed, most)
-        speed, steps = speed + impulse / mass, steps + 1
+        speed = speed + impulse / mass
+        steps = steps + 1
         if impulse == wanted:
             break
     return (
@@ -80,15 +82,14 @@ def erratum_spreading() -> tuple[Comparisons, Twins]:
 def erratum_saturation() -> tuple[Comparisons, Twins]:
     """The peg's energies for the full impulse and for the one clipped by the device: 15 N and 1 N m
     for 1/512 s."""
-    mass, inertia, arm, speed, spin = (
-        Fraction(2),
-        Fraction(1, 200),
-        Fraction(1, 100),
-        Fraction(-1, 10),
-        Fraction(4),
-    )
+    mass = Fraction(2)
+    inertia = Fraction(1, 200)
+    arm = Fraction(1, 100)
+    speed = Fraction(-1, 10)
+    spin = Fraction(4)
     p = -(speed + arm * spin) / (1 / mass + arm**2 / inertia)
-    force, torque = min(p, Fraction(15, 512)), min(arm * p, Fraction(1, 512))
+    force = min(p, Fraction(15, 512))
+    torque = min(arm * p, Fraction(1, 512))
 
     def gained(force: Fraction, torque: Fraction) -> Fraction:
         return force * speed + force**2 / (2 * mass) + torque * spin + torque**2 / (2 * inertia)
@@ -197,7 +198,8 @@ def fp_gram_pinv() -> tuple[Comparisons, Twins]:
 def random_case(draw: random.Random) -> Case:
     """Return a rational impact: M = B Bᵀ + I, rows of J with repeats and combinations, e = p/q in
     [−1, 1]."""
-    d, c = draw.randint(1, LARGEST), draw.randint(1, LARGEST + 1)
+    d = draw.randint(1, LARGEST)
+    c = draw.randint(1, LARGEST + 1)
 
     def matrix(rows: int, columns: int) -> list[list[Fraction]]:
         return [
@@ -205,11 +207,13 @@ def random_case(draw: random.Random) -> Case:
             for _ in range(rows)
         ]
 
-    root, rows = matrix_of(matrix(d, d)), matrix(c, d)
+    root = matrix_of(matrix(d, d))
+    rows = matrix(c, d)
     if c > 1:
         rows[-1] = [2 * entry for entry in rows[0]]
     mass = root * root.transpose() + fmpq_mat([[int(i == j) for j in range(d)] for i in range(d)])
-    inverse, jacobian = mass.inv(), matrix_of(rows)
+    inverse = mass.inv()
+    jacobian = matrix_of(rows)
     return {
         "M": mass,
         "M⁻¹": inverse,
@@ -223,13 +227,12 @@ def random_case(draw: random.Random) -> Case:
 def exact_instances() -> tuple[Comparisons, Twins]:
     """Theorem 2 on random rational impacts: the kernel with python-flint, and SymPy, each reads
     theorem_2 by itself."""
-    draw, block = random.Random(SEED), layout.block("theorem_2")
+    draw = random.Random(SEED)
+    block = layout.block("theorem_2")
     theorem = Statement(block)
     cases = [completed(random_case(draw), theorem.definitions) for _ in range(CASES)]
-    shown, printed = (
-        [entry.formula for entry in block.all("show")],
-        theorem.reader.fact(block.all("twin")[0].formula),
-    )
+    shown = [entry.formula for entry in block.all("show")]
+    printed = theorem.reader.fact(block.all("twin")[0].formula)
     redundant = sum(case["J"].rank() < case["J"].nrows() for case in cases)
     by_flint = sum(all_hold(theorem.conclusions, case) for case in cases)
     both = sum(

@@ -90,7 +90,8 @@ def checked_steps(statement: Statement, known: Known) -> list[StepRecord]:
 
 
 def _checked(task: Task, known: Known) -> StepRecord:
-    claim, because = fact_line(task.claim), task.entry.note
+    claim = fact_line(task.claim)
+    because = task.entry.note
     try:
         step = (
             infer(task.claim, task.method, known)
@@ -107,7 +108,8 @@ def _checked(task: Task, known: Known) -> StepRecord:
 def _witnessed(statement: Statement) -> bool:
     """Return whether the hypotheses and the conclusions hold in the case without a name, as the
     kernel and SymPy read them."""
-    case, block = statement.case(""), statement.block
+    case = statement.case("")
+    block = statement.block
     formulas = [each for entry in block.all("given", "show") for each in entry.formula.split(";")]
     return all_hold([*statement.given, *statement.conclusions], case) and all(
         by_sympy.holds(block, formula, case) for formula in formulas
@@ -134,7 +136,8 @@ def _twin(entry: Entry, statement: Statement) -> Refutation:
     """Check that the case satisfies every hypothesis and breaks the twin's claim, as the kernel and
     SymPy read it."""
     title, _, words = entry.words.partition(" :: ")
-    claim, case = statement.reader.fact(entry.formula, words), statement.case(entry.case)
+    claim = statement.reader.fact(entry.formula, words)
+    case = statement.case(entry.case)
     refuted = (
         all_hold(statement.given, case)
         and not holds(claim, case)

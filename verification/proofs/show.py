@@ -11,7 +11,9 @@ from verification.proofs.cases import Case
 from verification.proofs.steps import Known, Step, reasons
 from verification.proofs.words import ANY, ONE, Expression, Fact
 
-YES, NO, NOT_APPLICABLE = "yes", "no", "not applicable"
+YES = "yes"
+NO = "no"
+NOT_APPLICABLE = "not applicable"
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,8 @@ class Statement:
     """
 
     def __init__(self, block: Block) -> None:
-        self.block, self.cases = block, dict[str, Case]()
+        self.block = block
+        self.cases = dict[str, Case]()
         self.names = {name: letter(name, *shape) for name, shape in block.shapes.items()}
         for name, formula in block.abbreviations:
             self.names[name] = Reader(self.names).expression(formula)
@@ -94,7 +95,8 @@ def _refuse_assumption(definition: Fact, names: Mapping[str, Expression], taken:
 
     `taken` holds the letters of the definitions before.
     """
-    left, right = definition.lhs, definition.rhs
+    left = definition.lhs
+    right = definition.rhs
     new = names_in(left)
     alone = len(new) == 1 and left == names[min(new)]
     fits = definition.relation == "=" and (left.rows != ANY or right.is_number)
@@ -112,5 +114,6 @@ def _cofactor(factors: Product) -> Cofactor:
     at = [i for i, each in enumerate(factors) if isinstance(each, Fact)]
     if len(at) != 1:
         raise Refused("a cofactor has one equation in square brackets")
-    left, right = factors[: at[0]], factors[at[0] + 1 :]
+    left = factors[: at[0]]
+    right = factors[at[0] + 1 :]
     return product(left), factors[at[0]], product(right)  # type: ignore[arg-type, return-value]

@@ -170,7 +170,9 @@ def reasons(factors: Factors, known: Known) -> list[Fact]:
 
 def _follows(method: str, claim: Fact, source: Fact, other: Fact | None) -> bool:
     """Whether the claim follows from `source` (a square or product) and the sign of `other`."""
-    x, value, kind = claim.difference, source.difference, "" if other is None else other.relation
+    x = claim.difference
+    value = source.difference
+    kind = "" if other is None else other.relation
     core = ONE if other is None else other.difference
     if method == "cancel" and claim.relation == "=" and source.relation in "=≥⪰":
         return (other is None or (kind == "≻" and core.rows == x.rows)) and _same(

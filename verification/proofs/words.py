@@ -205,7 +205,8 @@ class Fact:
 
 
 _RELATION = re.compile(r"\s*([=≠≤≥⪯⪰≻])\s*")
-_SIGNS, _ENDS = {"+": 1, "−": -1, "-": -1}, (")", "]", "=", "")
+_SIGNS = {"+": 1, "−": -1, "-": -1}
+_ENDS = (")", "]", "=", "")
 Product = tuple[Expression | Fact, ...]
 
 
@@ -231,9 +232,12 @@ class Reader:
         parts = _RELATION.split(text.strip())
         if len(parts) != 3:
             raise ArgumentError("formula", text, "two sides and one of = ≠ ≤ ≥ ⪯ ⪰ ≻")
-        left, relation, right = self.expression(parts[0]), parts[1], self.expression(parts[2])
+        left = self.expression(parts[0])
+        relation = parts[1]
+        right = self.expression(parts[2])
         if relation != "=":
-            left, right = (right - left if relation in "≤⪯" else left - right), number(0)
+            left = right - left if relation in "≤⪯" else left - right
+            right = number(0)
             relation = {"≤": "≥", "⪯": "⪰"}.get(relation, relation)
         if relation in "⪰≻" and left.rows != left.cols:
             raise ArgumentError("formula", text, "a square matrix")

@@ -167,7 +167,8 @@ def _percent(share: float | None) -> float | None:
 
 def order_of(left: dict[int, float]) -> float | None:
     """Return the order with which an error falls, from its size by the divisor of the step."""
-    (coarse, first), (fine, last) = min(left.items()), max(left.items())
+    (coarse, first) = min(left.items())
+    (fine, last) = max(left.items())
     if coarse == fine:
         return None
     return math.log(first / last) / math.log(fine / coarse) if last else math.inf

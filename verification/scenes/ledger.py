@@ -20,7 +20,8 @@ REFINEMENTS = {"quick": (1, 2, 4), "full": (1, 2, 4, 8)}
 WORTH_NAMING = 1.0  # [%] of the energy exchanged; scenes that leave more open are named
 # penetration, as a share of the thinnest moving shape, from which contacts push to the wrong side
 DEEP = 0.5
-DEEPEST, GAIN = "deepest overlap, of the thinnest shape", "most energy beyond what was put in"
+DEEPEST = "deepest overlap, of the thinnest shape"
+GAIN = "most energy beyond what was put in"
 
 
 def scene_row(run: Run) -> Row:

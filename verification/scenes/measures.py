@@ -80,7 +80,8 @@ class Trace:
 def trace_of(run: Run) -> Trace:
     """Return the trace of a run of the peg."""
     step = np.repeat(np.arange(run.steps), np.diff(run.contacts.offsets))
-    penetration, new_contact = np.zeros(run.steps), np.zeros(run.steps, np.bool_)
+    penetration = np.zeros(run.steps)
+    new_contact = np.zeros(run.steps, np.bool_)
     np.maximum.at(penetration, step, np.maximum(-run.contacts.gap, 0.0))
     np.logical_or.at(new_contact, step, run.contacts.is_new)
     body = run.scene_resolved["bodies"][0]
@@ -105,22 +106,23 @@ def trace_of(run: Run) -> Trace:
 def colliding_rows(run: Run, step: int, v: Floats) -> Floats:
     """Return the rows of J of the recorded contacts of a step that collide at the velocity v; it
     uses no resolver."""
-    here, slow = (
-        slice(*run.contacts.offsets[step : step + 2]),
-        run.scene_resolved["contact"]["approach_velocity"],
-    )
-    (x, y), n = (run.contacts.point[here, :2] - run.q[step, :2]).T, run.contacts.normal[here]
+    here = slice(*run.contacts.offsets[step : step + 2])
+    slow = run.scene_resolved["contact"]["approach_velocity"]
+    (x, y) = (run.contacts.point[here, :2] - run.q[step, :2]).T
+    n = run.contacts.normal[here]
     rows = np.column_stack([n[:, 0], n[:, 1], x * n[:, 1] - y * n[:, 0]])
     return np.asarray(rows[rows @ v < -slow])
 
 
 def _misfits(run: Run) -> Iterator[float]:
-    log, e = run.impacts, run.scene_resolved["contact"]["restitution"]
+    log = run.impacts
+    e = run.scene_resolved["contact"]["restitution"]
     for step, before, after, share in zip(
         log.step, log.v_minus, log.v_plus, log.scale, strict=True
     ):
         rows = colliding_rows(run, step, before)
-        off, approach = rows @ (after + (share * (1.0 + e) - 1.0) * before), rows @ before
+        off = rows @ (after + (share * (1.0 + e) - 1.0) * before)
+        approach = rows @ before
         yield float(np.max(np.abs(off)) / np.max(np.abs(approach))) if len(rows) else 0.0
 
 
@@ -225,7 +227,9 @@ def corner_gaps(positions: Floats) -> list[Floats]:
     """Return the gap of each of the four corners to the right wall (x = 0) and to the floor (y = 0)
     over time [m]."""
     x, y, theta = positions.T
-    c, s, (w, h) = np.cos(theta), np.sin(theta), HALF_SIZE
+    c = np.cos(theta)
+    s = np.sin(theta)
+    (w, h) = HALF_SIZE
     corners = ((-w, -h), (-w, h), (w, -h), (w, h))
     return [gap for a, b in corners for gap in (x + a * c - b * s, -(y + a * s + b * c))]
 

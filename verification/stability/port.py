@@ -24,7 +24,9 @@ from verification.port.device import BareDevice
 from verification.port.kit import ForceReport, check_force
 from verification.table import Row, Table
 
-STIFFNESS, DAMPING = 1000.0, 50.0  # of the paper's walls and coupler [N/m, N s/m]
+# of the paper's walls and coupler [N/m, N s/m]
+STIFFNESS = 1000.0
+DAMPING = 50.0
 RATE = 512.0
 LIMIT = 15.0  # [N] of the paper's device
 REACH = 0.01  # [m]: the wall is 1 mm away
@@ -68,7 +70,8 @@ def report_of(study: Study, name: str) -> ForceReport:
 
 def _needs(study: Study, name: str) -> Row:
     """Return what a law needs of a device without friction."""
-    report, bound = report_of(study, name), 0.5 * STIFFNESS / RATE + COUPLINGS[name][1]
+    report = report_of(study, name)
+    bound = 0.5 * STIFFNESS / RATE + COUPLINGS[name][1]
     enough = bool(np.isfinite(report.damping_needed))
     return {
         "law": name,

@@ -20,11 +20,10 @@ from numpy.typing import NDArray
 from reference import Floats
 
 PENALTY, IMPULSES = LAWS = ("penalty", "impulses")
-SETTLES, BOUNCES_ON, GROWS = (
-    "+",
-    "o",
-    "x",
-)  # the marks of a wall: the mass settles, keeps bouncing, moves ever more
+# the marks of a wall: the mass settles, keeps bouncing, moves ever more
+SETTLES = "+"
+BOUNCES_ON = "o"
+GROWS = "x"
 PAPER_DAMPING = 50.0  # B of the paper's walls [N s/m]
 
 SETTLED_SPEED = 1e-3  # [m/s] as in the claims: a hundredth of the speed at contact
@@ -116,9 +115,11 @@ def touch_walls(loop: Loop, stiffness: Floats, damping: Floats, law: str) -> Con
     stiffness, damping : K [N/m] and B [N s/m] of the walls, in shapes that broadcast
     law : "penalty" or "impulses"
     """
-    (K, B), r = np.broadcast_arrays(stiffness, damping), loop.resolution
+    (K, B) = np.broadcast_arrays(stiffness, damping)
+    r = loop.resolution
     steps = round(loop.seconds * loop.rate)
-    x, v = np.full(K.shape, -loop.distance), np.full(K.shape, loop.speed)
+    x = np.full(K.shape, -loop.distance)
+    v = np.full(K.shape, loop.speed)
     first = np.round(x / r) * r if r > 0.0 else x.copy()
     readings = [
         first - loop.speed * loop.step,
@@ -138,17 +139,22 @@ def touch_walls(loop: Loop, stiffness: Floats, damping: Floats, law: str) -> Con
         commands.append(command)
         force = commands.pop(0)
         acceleration = (loop.push - force) / loop.mass
-        x, v = x + moved * v + held * acceleration, free * v + moved * acceleration
+        x = x + moved * v + held * acceleration
+        v = free * v + moved * acceleration
         diverged = ~(np.abs(x) < 1e3)  # metres: the motion diverges and would overflow
-        x, v = np.where(diverged, 1e3, x), np.where(diverged, 1e3, v)
-        positions[k], speeds[k], forces[k] = x, v, force
+        x = np.where(diverged, 1e3, x)
+        v = np.where(diverged, 1e3, v)
+        positions[k] = x
+        speeds[k] = v
+        forces[k] = force
     return _watched(loop, positions, speeds, forces)
 
 
 def _held_force(loop: Loop) -> tuple[float, float, float]:
     """Return E, φ, ψ of the exact step v⁺ = E v + φ a, x⁺ = x + φ v + ψ a with c = bT/m, E =
     exp(−c)."""
-    T, c = loop.step, loop.device_damping * loop.step / loop.mass
+    T = loop.step
+    c = loop.device_damping * loop.step / loop.mass
     if c < _SMALL:
         return (
             1.0 - c + 0.5 * c * c,

@@ -68,7 +68,8 @@ def test_a_stack_without_friction_stands_for_twenty_seconds(name: str, rate: int
 
 def coin(place: list[float], turn: list[float], velocity: list[float]) -> Values:
     mass = 0.01
-    a, b = (0.02, 0.004)
+    a = 0.02
+    b = 0.004
     moments = [mass * (a**2 + b**2) / 12, mass * (a**2 + b**2) / 12, mass * a**2 / 6]
     shape = {"kind": "box", "size": [a, a, b]}
     given = {"name": "coin", "joint": "free_flyer", "mass": mass, "inertia": moments}

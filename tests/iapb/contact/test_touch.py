@@ -121,7 +121,8 @@ def test_corners_of_a_fast_spin_touch_without_overlap() -> None:
 
 def test_the_certificate_judges_a_constant_mass_matrix_as_the_engine_has_it() -> None:
     """Turned, the inertia of this box rounds to another double, and 1 of 30 impacts would gain."""
-    mass, inertia = 0.9608369981557852, 0.0008835501300641513
+    mass = 0.9608369981557852
+    inertia = 0.0008835501300641513
     start = np.array([-0.18, 0.157, 0.746, 0.682, 0.589, 3.46])
     scene = toss_scene(start, 1000.0, restitution=1.0, seconds=4.0)
     changed = {"bodies.box.mass": mass, "bodies.box.inertia": inertia}

@@ -80,7 +80,8 @@ def test_an_error_that_is_no_number_is_a_failure_and_failing_impacts_are_counted
 
 def test_instances_repeat_and_have_the_rank_they_say():
     family = Family(6, 12, 4, 1e4)
-    first, second = list(draw_of_rank(family, 3, seed=7)), list(draw_of_rank(family, 3, seed=7))
+    first = list(draw_of_rank(family, 3, seed=7))
+    second = list(draw_of_rank(family, 3, seed=7))
     for one, other in zip(first, second, strict=True):
         assert np.array_equal(one.mass_matrix, other.mass_matrix)
         assert np.linalg.matrix_rank(one.contact_jacobian) == one.rank == 4

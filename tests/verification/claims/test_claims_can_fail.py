@@ -12,9 +12,12 @@ TOGETHER = {"distance": 0.0, "angle": 1e-15, "impacts limited": 1.0}
 SETTLED = {"test": walls.SETTLES, "impulses settle after": 0.2}
 LOSS = {"part": algebraic.WITH_HALF, "restitution": 0.5}
 AHEAD = {"part": peg.SETTLES, "ahead": 0.4, "ahead, limited": 0.4}
-NEAR, FAR = 1e-4, 1e-3  # [m] or [rad]
+# [m] or [rad]
+NEAR = 1e-4
+FAR = 1e-3
 MOVED = {"part": algebraic.ALMOST, "apart": 1e-12, "turned apart": 0.0, "bound": 1e-11}
-BEST, WORST = {"IAPB": NEAR, "PB": FAR, "CBuc": FAR}, {"IAPB": FAR, "PB": NEAR, "CBuc": FAR}
+BEST = {"IAPB": NEAR, "PB": FAR, "CBuc": FAR}
+WORST = {"IAPB": FAR, "PB": NEAR, "CBuc": FAR}
 BEST["part"] = WORST["part"] = ""
 PUSHED = BEST | {"part": f"{peg.NEARER}, x"}
 FILTERED = {"part": socket.BOTH, "false collisions without filters": 26, "false collisions": 1}

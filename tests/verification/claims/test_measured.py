@@ -90,7 +90,8 @@ STARTS = (
 def test_averages_over_half_and_over_four_times_the_steps_give_the_verdicts_of_the_forces(
     monkeypatch,
 ):
-    study, found = Study(), {}
+    study = Study()
+    found = {}
     for steps in (AVERAGED, AVERAGED // 2, 4 * AVERAGED):
         monkeypatch.setattr(peg, "AVERAGED", steps)
         rows = [
@@ -108,7 +109,8 @@ def test_averages_over_half_and_over_four_times_the_steps_give_the_verdicts_of_t
 def test_the_bands_bound_what_a_shorter_step_of_the_ideal_world_changes():
     """The bands are 1 to 3.5 times what the lead of IAPB changes by if the ideal world has four
     times the rate."""
-    study, changes = Study(), []
+    study = Study()
+    changes = []
     for start in STARTS:
         ideal, *worlds = (trace(study, start, world) for world in ("ideal", *WORLDS))
         fine = measures.trace_of(

@@ -42,7 +42,8 @@ def explicit_rates(contact: dict[str, float], rate: float) -> tuple[float, float
     """B T / m, and μ F_n T / (v_threshold m_t) with the largest F_n of the run: what a held force
     may reach."""
     scene = socket(contact, rate, 9)
-    run, ball = run_world(scene, "IAPB"), scene.bodies[0]
+    run = run_world(scene, "IAPB")
+    ball = scene.bodies[0]
     felt = 1.0 / (1.0 / ball.mass + ball.shapes[0].radius ** 2 / ball.inertia)
     pressed = float(np.max(run.contacts.normal_force))
     slope = scene.contact.friction * pressed / scene.contact.friction_velocity

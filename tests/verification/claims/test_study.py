@@ -79,7 +79,8 @@ def test_worlds_under_the_wrong_name_are_found_out(few):
 
 
 def test_a_limited_device_clips_the_forces_of_both_laws():
-    asked, hard = Study(run_world), replace(Condition(), force_limit=0.2)
+    asked = Study(run_world)
+    hard = replace(Condition(), force_limit=0.2)
     forces = {
         (world, limit): peak_force(trace(asked, replace(hard, force_limit=limit), world, rendering))
         for world, rendering in (("PB", "full"), ("IAPB", "spread"))

@@ -37,7 +37,9 @@ from verification.finding import (
 from verification.region import LEAST_CONFIRMING, Region, search_region
 from verification.table import table_from
 
-YES, NO, UNKNOWN = True, False, None
+YES = True
+NO = False
+UNKNOWN = None
 
 
 def table(rows, holds, **marks):
@@ -230,7 +232,8 @@ def drawn_by(holds, count=20):
 
     def draw(region):
         rng = np.random.default_rng(5)
-        tilt, width = region.ends("tilt", (0.0, 0.3)), region.ends("width", (1.0, 4.0))
+        tilt = region.ends("tilt", (0.0, 0.3))
+        width = region.ends("width", (1.0, 4.0))
         rows = [
             {"tilt [rad]": rng.uniform(*tilt), "width [m]": rng.uniform(*width)}
             for _ in range(count)

@@ -71,7 +71,8 @@ def test_a_truth_does_not_depend_on_rounding(case: study.TruthCase) -> None:
     60 events.
     """
     scene = study.scene_of(case.scene)
-    truth, start = truth_of(case.scene), System(scene).make_state()
+    truth = truth_of(case.scene)
+    start = System(scene).make_state()
     time = np.linspace(0.0, case.duration, 101)
     rng = np.random.default_rng(0)
     size = 10.0 ** rng.uniform(-14.0, -12.0)

@@ -54,7 +54,8 @@ def test_a_folder_of_problems(tmp_path: Path) -> None:
     (tmp_path / "skew.lcp").write_text("2  2 1  0 2  -1 -1")
     (tmp_path / "damaged.lcp").write_text("3 1 2")
     (tmp_path / "readme.md").write_text("not a problem")
-    study, (check,) = Study(), collections({"given": tmp_path})
+    study = Study()
+    (check,) = collections({"given": tmp_path})
     table = check.table(study)
     one, skew, damaged = table.records()
     assert (one["problem"], skew["problem"], damaged["problem"]) == (

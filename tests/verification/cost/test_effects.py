@@ -59,7 +59,8 @@ def test_an_effect_that_does_nothing_leaves_the_same_bits(name: str) -> None:
     M is a constant of some scenes in space to rounding alone: turned to each pose it has other last
     bits.
     """
-    scene, world = _scene(name, 0.3), find_world("IAPB")
+    scene = _scene(name, 0.3)
+    world = find_world("IAPB")
     whole = Loop(scene, world)
     whole.sample()
     spatial = isinstance(scene, SpatialScene)

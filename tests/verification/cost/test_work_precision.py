@@ -27,7 +27,8 @@ PROBLEMS = [
 def test_daqp_solves_every_hard_impact_of_equalities(problem: ImpactCase) -> None:
     """Equalities and complementarity have one answer, and no rival fails because of the tolerance
     that we give it."""
-    J, v = problem.contact_jacobian, problem.velocity
+    J = problem.contact_jacobian
+    v = problem.velocity
     truth = np.array([float(x) for x in problem.truth])
     assert (
         np.abs(J @ truth + problem.restitution * (J @ v)).max()
@@ -149,7 +150,9 @@ def chosen_from(ways: dict[str, list[tuple[float, ...]]]) -> study.Choice:
 
 
 def test_impacts_without_an_answer_in_time_are_not_solved() -> None:
-    good, bad, late = (2.0, 1e-6), (2.0, 0.5), (1e5, 0.0)
+    good = (2.0, 1e-6)
+    bad = (2.0, 0.5)
+    late = (1e5, 0.0)
     for found, share, solved in (
         ([good, late], 0.5, 0.5),
         ([good, good, bad, bad], 1.0, 0.5),

@@ -40,7 +40,8 @@ def test_the_engine_is_stable_but_where_it_says_not(name: str) -> None:
 @pytest.mark.parametrize("name", HARD_CASES)
 def test_a_fault_of_a_tenth_in_the_answer_is_seen(name: str) -> None:
     """In the engine's answer or, where that is wrong already, in the first stable one."""
-    case, red = HARD_CASES[name](), []
+    case = HARD_CASES[name]()
+    red = []
     for method in judge.methods_for(case):
         verdict = _judged(name, method)
         if verdict["outcome"] != STABLE:

@@ -34,7 +34,8 @@ def _energy(case: HardCase, velocity: Any) -> Fraction:
 
 def test_poissons_law_on_the_bar() -> None:
     """Contact 1 alone stops and returns the bar: p_c = 1/(1 + 3) each way, by hand."""
-    mass, rows = _exact([[1, 0], [0, "1/12"]]), _exact([[1, "1/2"], [1, "2/5"]])
+    mass = _exact([[1, 0], [0, "1/12"]])
+    rows = _exact([[1, "1/2"], [1, "2/5"]])
     velocity, pushing = exact_poisson(mass, rows, [-1, 0], [1, 0])
     assert velocity @ mass @ velocity / 2 <= Fraction(1, 2) and min(rows @ velocity) >= 0
     assert pushing >= 1 and _impact("bar_with_unequal_restitution").truth.rank == pushing
@@ -45,7 +46,8 @@ def test_friction_meets_restitution_exactly_and_gives_the_energy_back_to_the_cer
 ):
     case = _impact("double_pendulum_with_friction")
     assert isinstance(case, FrictionalCase)
-    row, before = _exact(case.contact_jacobian[0]), _exact(case.velocity)
+    row = _exact(case.contact_jacobian[0])
+    before = _exact(case.velocity)
     for after in (case.truth.velocity, case.impact.velocity(1)):
         assert row @ after == -Fraction(case.restitution) * (row @ before)
     gain = _energy(case, case.truth.velocity) - _energy(case, before)
@@ -85,7 +87,8 @@ def test_the_break_shot_is_that_of_billiards() -> None:
     """Striker: 1 − 4 n²/(1 + 2 n²) of its speed, with n = 4/5 between the balls' line and the way;
     energy kept."""
     case = _impact("break_shot")
-    after, n = case.truth.velocity, Fraction(4, 5)
+    after = case.truth.velocity
+    n = Fraction(4, 5)
     assert after[0] == -(1 - 4 * n**2 / (1 + 2 * n**2)) and after[1] == 0
     assert after[2] == after[4] and after[3] == -after[5]
     assert _energy(case, after) == Fraction(1, 2)
@@ -99,7 +102,8 @@ def test_all_stop_or_return_as_by_hand() -> None:
     assert (
         _impact("wedged_peg").truth.velocity == (0, 0, 0) and _impact("wedged_peg").truth.rank == 3
     )
-    stack, wedge = _impact("stack_of_mass_ratio"), _impact("wedge")
+    stack = _impact("stack_of_mass_ratio")
+    wedge = _impact("wedge")
     masses = _exact(np.diag(stack.mass_matrix))
     assert set(stack.truth.velocity) == {masses @ _exact(stack.velocity) / sum(masses)}
     assert wedge.truth.velocity == tuple(Fraction(-1, 2) * Fraction(x) for x in wedge.velocity)
@@ -108,7 +112,8 @@ def test_all_stop_or_return_as_by_hand() -> None:
 def test_the_rocking_block_keeps_housners_share() -> None:
     """ω⁺/ω⁻ = 1 − 3/2 sin² α, sin α = 3/5, so that ¾ (…)² of its energy is left after each rock."""
     case = _impact("rocking_block")
-    after, share = case.truth.velocity, 1 - Fraction(3, 2) * Fraction(9, 25)
+    after = case.truth.velocity
+    share = 1 - Fraction(3, 2) * Fraction(9, 25)
     assert float(after[2] - share) == pytest.approx(0.0, abs=1e-15)  # the inertia 25/3 is a double
     left = _energy(case, after) / _energy(case, case.velocity)
     assert float(left) == pytest.approx(float(share) ** 2, abs=1e-14)
@@ -116,7 +121,8 @@ def test_the_rocking_block_keeps_housners_share() -> None:
 
 def test_the_superball_returns_its_point_of_contact() -> None:
     case = _impact("superball")
-    before, after = _exact(case.velocity), case.truth.velocity
+    before = _exact(case.velocity)
+    after = case.truth.velocity
     assert not (_exact(case.contact_jacobian) @ (before + after)).any()
     assert _energy(case, before) == _energy(case, after)
 
@@ -132,11 +138,10 @@ def test_the_superball_returns_its_point_of_contact() -> None:
 def test_a_held_point_rests_and_keeps_the_angular_momentum_about_it(
     name: str, point: tuple[str, ...]
 ) -> None:
-    case, r = _impact(name), _exact(point)
-    after, momentum = (
-        _exact(case.truth.velocity),
-        _exact(case.mass_matrix) @ (_exact(case.truth.velocity) - _exact(case.velocity)),
-    )
+    case = _impact(name)
+    r = _exact(point)
+    after = _exact(case.truth.velocity)
+    momentum = _exact(case.mass_matrix) @ (_exact(case.truth.velocity) - _exact(case.velocity))
     assert not (after[:3] + np.cross(after[3:], r)).any()
     assert not (
         momentum[3:] - np.cross(r, momentum[:3])
@@ -161,7 +166,11 @@ def test_the_pushed_plate_slides_sticks_once_and_slides_on() -> None:
 
     The swing decays: from one period 2π/Ω to the next by exp(−2π a/Ω), a = B/2m, Ω² = K/m − a².
     """
-    mass, stiffness, damper, limit, speed = 1.0, 1e4, 10.0, 0.3 * 9.81, 0.01
+    mass = 1.0
+    stiffness = 1e4
+    damper = 10.0
+    limit = 0.3 * 9.81
+    speed = 0.01
     time = np.linspace(0.0, 0.5, 200_001)
     x = pushed_plate(time)
     rate = np.gradient(x, time)

@@ -100,7 +100,8 @@ def _one_sweep(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
 def _plastic(M: Floats, J: Floats, T: Floats, v: Floats, mu: Floats, e: float = 0.0) -> Impulses:
     """Normal and tangential impulses (c,), (c, m) of Coulomb's law with Newton's e, by sweeps over
     the contacts."""
-    c, m = len(J), T.shape[1]
+    c = len(J)
+    m = T.shape[1]
     if not c:
         return np.zeros(0), np.zeros((0, m))
     rows = np.concatenate([J[:, None], T], axis=1).reshape(-1, len(v))

@@ -20,12 +20,11 @@ from verification.table import HOLDS
 def test_the_clamp_is_what_keeps_the_bound() -> None:
     """An impact of written numbers and a resolver without BLAS: the same gain on every
     processor."""
-    T, D = (
-        np.array([[1.0, 0.0, 0.0], [-2.0, 1.0, 0.0], [-2.0, 1.0, 1.0]]),
-        np.array([1e-3, 1e-11, 1e-11]),
-    )
+    T = np.array([[1.0, 0.0, 0.0], [-2.0, 1.0, 0.0], [-2.0, 1.0, 1.0]])
+    D = np.array([1e-3, 1e-11, 1e-11])
     M = np.sum(T[:, None, :] * D * T[None, :, :], axis=2)
-    J, v = np.array([[1.0, 0.0, 3.0]]), np.array([0.0, -2.0, 2.0])
+    J = np.array([[1.0, 0.0, 3.0]])
+    v = np.array([0.0, -2.0, 2.0])
     bound = FACTORED.energy_gain(ImpactCase(M, J, v, 1.0))
     gains = [
         relative_energy_gain(M, v, resolve_impact(M, J, v, 1.0, clamp=clamp).velocity)

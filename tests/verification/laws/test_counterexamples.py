@@ -132,7 +132,8 @@ def test_a_child_is_the_resolver_and_starts_anew() -> None:
 
     calls: list[float] = []
     case = ImpactCase(np.eye(2), np.ones((1, 2)), np.ones(2), 0.5)
-    child, given = Child(counts, 5.0), case.given()
+    child = Child(counts, 5.0)
+    given = case.given()
     try:
         assert child(*given)[0] == 1.0 and not given[1].any() and child(*case.given())[0] == 2.0
         child.restart()

@@ -81,7 +81,8 @@ def test_the_sum_over_batches_does_not_depend_on_how_the_cases_are_cut() -> None
     subject = study.subject_of(wrong_sign)
     cut = [study.judge_batch(study.Batch(study.IMPACTS, first, 10), subject) for first in (0, 10)]
     whole = study.judge_batch(study.Batch(study.IMPACTS, 0, 20), subject)
-    (counts, found), (expected, first) = study.summed(cut), study.summed([whole])
+    (counts, found) = study.summed(cut)
+    (expected, first) = study.summed([whole])
     assert counts == expected and counts[study.IMPACTS]["kinetic_energy"].failures > 0
     assert [(one.law, one.index) for one in sorted(found, key=lambda one: one.law)] == [
         (one.law, one.index) for one in sorted(first, key=lambda one: one.law)

@@ -41,7 +41,8 @@ def test_a_gain_that_no_blas_touches_is_reported_as_exact_rationals_have_it() ->
     """(1 + e)(1 + δ) times the projection P u changes the energy by its factor f (f − 2) of |P u|²
     / |u|²."""
     report = check_passivity(returns_too_much, impacts=30, search=60)
-    verdict, case = report.verdict("kinetic_energy"), report.counterexample
+    verdict = report.verdict("kinetic_energy")
+    case = report.counterexample
     most = float(2 * TOO_MUCH * (2 * TOO_MUCH - 2))
     assert verdict.largest == pytest.approx(
         most, rel=1e-12
@@ -49,7 +50,8 @@ def test_a_gain_that_no_blas_touches_is_reported_as_exact_rationals_have_it() ->
     assert report.broken_laws[0] == report.counterexample_law == "kinetic_energy"
     assert (case.coordinates, case.contacts, case.restitution) == (1, 1, 1.0)
     found = verdict.worst_case
-    plastic, factor = exact_impact(*found.arrays, 0), (1 + Fraction(found.restitution)) * TOO_MUCH
+    plastic = exact_impact(*found.arrays, 0)
+    factor = (1 + Fraction(found.restitution)) * TOO_MUCH
     share = 1 - plastic.energy_after / plastic.energy_before
     assert verdict.worst.value == pytest.approx(float(factor * (factor - 2) * share), rel=1e-9)
 
@@ -130,7 +132,8 @@ def test_with_unequal_restitution_rows_may_come_in_any_order() -> None:
 
     def poisson_of_the_active_set(M: Floats, J: Floats, v: Floats, e: Floats | float) -> Floats:
         lower = np.linalg.cholesky(M)
-        A, u = np.linalg.solve(lower, J.T), lower.T @ v
+        A = np.linalg.solve(lower, J.T)
+        u = lower.T @ v
         returned = u + A @ ((1.0 + e) * nnls(A, -u)[0])
         return np.asarray(np.linalg.solve(lower.T, returned + A @ nnls(A, -returned)[0]))
 

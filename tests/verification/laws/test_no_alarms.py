@@ -106,7 +106,8 @@ def test_the_distance_from_the_cone_of_two_sliding_contacts_on_dependent_rows_is
         )
         push = np.concatenate([normal, sliding.ravel()])
         target = push @ case.with_tangents.rows
-        target, unit = target / np.linalg.norm(target), replace(case, restitution=0.0)
+        target = target / np.linalg.norm(target)
+        unit = replace(case, restitution=0.0)
         assert distance_from_cone(unit, target) <= 1e-8
         beyond = np.concatenate([normal, 1.01 * sliding.ravel()]) @ case.with_tangents.rows
         if case.contacts == 1 and case.friction[0] > 0.0:

@@ -25,7 +25,9 @@ class Flight:
 
     name = "flight"
     settings: dict[str, Any] = {}
-    field, reported = 1.0, 1.0  # factors of gravity and of the reported velocity
+    # factors of gravity and of the reported velocity
+    field = 1.0
+    reported = 1.0
 
     def ignored(self, scene: Scene) -> tuple[str, ...]:
         return ("hand",) * (scene.hand is not None)
@@ -39,7 +41,8 @@ class Flight:
         system = System(scene)
         mechanism = system.mechanism
         q, v = system.start
-        places, rates = [q], [v]
+        places = [q]
+        rates = [v]
         for _ in range(steps or scene.steps):
             force = -mechanism.bias(q, v) - self.field * mechanism.gravity(q, system.gravity)
             v = v + scene.step * np.linalg.solve(mechanism.mass_matrix(q), force)

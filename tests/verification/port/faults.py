@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-K, B = 2000.0, 2.0
+K = 2000.0
+B = 2.0
 DAMPING = 3.06
 
 
@@ -76,7 +77,8 @@ class Late:
         self.last = 0.0
 
     def step(self, x, v):
-        force, self.last = self.last, wall(x, v)
+        force = self.last
+        self.last = wall(x, v)
         return force
 
 
@@ -84,7 +86,8 @@ class Lagging:
     """The force passes a filter of 5 ms."""
 
     def reset(self, dt):
-        self.force, self.share = 0.0, dt / (5e-3 + dt)
+        self.force = 0.0
+        self.share = dt / (5e-3 + dt)
 
     def step(self, x, v):
         self.force += self.share * (wall(x, v) - self.force)
@@ -97,7 +100,8 @@ class EverySecond:
     every = 2
 
     def reset(self):
-        self.k, self.force = 0, 0.0
+        self.k = 0
+        self.force = 0.0
 
     def step(self, x, v):
         if self.k % self.every == 0:
@@ -114,7 +118,8 @@ class GainOfTheFilter:
     """A filter of the velocity whose gain is 3."""
 
     def reset(self, dt):
-        self.rate, self.share = 0.0, dt / (2e-4 + dt)
+        self.rate = 0.0
+        self.share = dt / (2e-4 + dt)
 
     def step(self, x, v):
         self.rate += self.share * (3.0 * v - self.rate)
@@ -125,7 +130,8 @@ class Integral:
     """A controller with an integral term."""
 
     def reset(self, dt):
-        self.sum, self.dt = 0.0, dt
+        self.sum = 0.0
+        self.dt = dt
 
     def step(self, x, v):
         self.sum += x * self.dt
@@ -147,7 +153,8 @@ class Vibrates:
     """Vibrates at 100 Hz once the wall is touched."""
 
     def reset(self, dt):
-        self.dt, self.k = dt, 0
+        self.dt = dt
+        self.k = 0
 
     def step(self, x, v):
         self.k += x > 0.0
@@ -158,11 +165,14 @@ class FreeTool:
     """A tool of 0.1 kg that takes the hand's velocity for nothing, and hits the wall by a coupler."""
 
     def reset(self, dt):
-        self.dt, self.at, self.rate = dt, 0.0, 0.0
+        self.dt = dt
+        self.at = 0.0
+        self.rate = 0.0
 
     def step(self, x, v):
         if x <= 0.0:
-            self.at, self.rate = x, v
+            self.at = x
+            self.rate = v
             return 0.0
         pull = 500.0 * (x - self.at)
         self.rate += self.dt * (pull - (3e3 * self.at if self.at > 0.0 else 0.0)) / 0.1
@@ -225,7 +235,8 @@ class ImpulseAsForce:
         self.inside = False
 
     def step(self, x, v):
-        new, self.inside = x > 0.0 and not self.inside, x > 0.0
+        new = x > 0.0 and not self.inside
+        self.inside = x > 0.0
         return -2.0 * v if new else 0.0
 
 

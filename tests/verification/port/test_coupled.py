@@ -24,7 +24,9 @@ class Moved:
     """A device that replays readings; it records the forces."""
 
     def __init__(self, q, v):
-        self.q, self.v, self.forces = q, v, []
+        self.q = q
+        self.v = v
+        self.forces = []
 
     def read(self):
         k = min(len(self.forces), len(self.q) - 1)
@@ -38,9 +40,11 @@ class Moved:
 
 @pytest.mark.parametrize("world", ["PB", "IAPB", "CBuc"])
 def test_following_a_hand_gives_the_bits_of_a_device_that_moves_alike_again_and_again(world):
-    scene, device = wall_scene(world, 1000.0, 50.0), BareDevice(512.0)
+    scene = wall_scene(world, 1000.0, 50.0)
+    device = BareDevice(512.0)
     q, v = device.readings(hand(0) - RADIUS)
-    moved, chosen = Moved(q, v), find_world(world)
+    moved = Moved(q, v)
+    chosen = find_world(world)
     simulation = Simulation(scene, chosen.law, chosen.coupling_in(scene), device=moved)
     for _ in q:
         simulation.step()
@@ -91,7 +95,8 @@ def test_cbuc_needs_more_than_colgate_s_bound_of_its_coupler():
 
 
 def test_passivity_control_makes_a_passive_wall_active():
-    device, options = BareDevice(damping=1.02), {"laws": ["energy"], "effort": 0.3}
+    device = BareDevice(damping=1.02)
+    options = {"laws": ["energy"], "effort": 0.3}
     assert check_force(PenaltyWall(2000.0), device, **options).passed
     controlled = check_force(PassivityControl(PenaltyWall(2000.0)), device, **options)
     assert not controlled.passed and controlled.damping_needed > 10.0

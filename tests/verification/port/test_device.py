@@ -31,7 +31,8 @@ def test_readings_are_rounded_late_and_differenced():
 
 def test_no_reading_knows_the_future():
     rng = np.random.default_rng(1)
-    device, at = BareDevice(resolution=1e-3, delay=2), rng.normal(size=(20, 2))
+    device = BareDevice(resolution=1e-3, delay=2)
+    at = rng.normal(size=(20, 2))
     changed = at.copy()
     changed[10:] += 1.0
     for one, other in zip(device.readings(at), device.readings(changed), strict=True):
@@ -42,7 +43,8 @@ class Counter:
     """Counts its samples since the reset; knows the period."""
 
     def reset(self, dt):
-        self.dt, self.count = dt, 0
+        self.dt = dt
+        self.count = 0
 
     def step(self, x, v):
         self.count += 1
@@ -65,7 +67,8 @@ def test_a_law_may_return_the_same_array_again_and_its_changes_are_counted():
         x += 1.0
         return held
 
-    port, at = Port(law, BareDevice(), 2), np.arange(6.0).reshape(3, 2)
+    port = Port(law, BareDevice(), 2)
+    at = np.arange(6.0).reshape(3, 2)
     assert np.array_equal(port.forces(at), at) and port.changed == 1
 
 

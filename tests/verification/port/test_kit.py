@@ -69,7 +69,8 @@ def test_a_planted_fault_is_found_by_its_name(law, fault):
 
 @pytest.mark.thorough
 def test_every_planted_fault_is_found_and_its_test_fails_in_a_fresh_process(tmp_path):
-    missed, tests = [], []
+    missed = []
+    tests = []
     for k, (law, fault) in enumerate(EVERY):
         report = checked(law, fault)
         found = [one for one in report.found if one[0] == law]

@@ -112,7 +112,8 @@ def test_random_linear_walls(k):
 @pytest.mark.parametrize("k", range(40))
 def test_random_force_tables(k):
     law, device = truths.random_table(k)
-    need, options = law.need(device), {"laws": ["energy"], "stored": law.stored}
+    need = law.need(device)
+    options = {"laws": ["energy"], "stored": law.stored}
     report = check_force(law, device, **options)
     assert CLOSE * need <= report.damping_needed <= 1.0005 * need
     alarm = replace(device, damping=1.001 * need)

@@ -52,10 +52,13 @@ class Filtered:
     """A spring and a damper whose velocity passes a first-order filter."""
 
     def __init__(self, stiffness=K, damping=B, tau=3e-3):
-        self.stiffness, self.damping, self.tau = stiffness, damping, tau
+        self.stiffness = stiffness
+        self.damping = damping
+        self.tau = tau
 
     def reset(self, dt):
-        self.share, self.rate = self.tau / (self.tau + dt), 0.0
+        self.share = self.tau / (self.tau + dt)
+        self.rate = 0.0
 
     def step(self, x, v):
         self.rate = self.share * self.rate + (1.0 - self.share) * v
@@ -66,7 +69,8 @@ class Renewed:
     """A spring whose force is renewed every second period."""
 
     def reset(self):
-        self.k, self.force = 0, 0.0
+        self.k = 0
+        self.force = 0.0
 
     def step(self, x, v):
         if self.k % 2 == 0:
@@ -84,7 +88,8 @@ class Linear:
     tau: float = 0.0
 
     def reset(self, dt):
-        self.share, self.rate = self.tau / (self.tau + dt), 0.0
+        self.share = self.tau / (self.tau + dt)
+        self.rate = 0.0
 
     def step(self, x, v):
         self.rate = self.share * self.rate + (1.0 - self.share) * v

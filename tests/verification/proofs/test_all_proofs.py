@@ -30,7 +30,8 @@ def test_numbers_on_the_pages_of_proofs_are_those_of_doubles_and_of_one_mass_on_
 ):
     """The exact factors are those of numpy's own rounding of J Jᵀ; the explicit force creates
     energy."""
-    a, t = 1.0 - 2.0**-40, 2.0**-28
+    a = 1.0 - 2.0**-40
+    t = 2.0**-28
     w = np.array([[1.0, a], [a, a * a + t * t]])
     assert w[1, 1] == 1.0 - 2.0**-39
     assert energy_factor(40) == (1 + Fraction(2) ** 25) ** 2 and energy_factor_above_cutoff(19) > 1

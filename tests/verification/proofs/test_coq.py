@@ -61,7 +61,8 @@ def near_the_border(
     )
     v = rng.normal(size=(n, d)) * 10.0 ** rng.uniform(-decades, decades, (n, 1))
     w = np.where(rng.random((n, 1)) < 0.5, v, -v)
-    entry, towards = rng.integers(0, d, n), np.where(rng.random(n) < 0.5, np.inf, -np.inf)
+    entry = rng.integers(0, d, n)
+    towards = np.where(rng.random(n) < 0.5, np.inf, -np.inf)
     w[np.arange(n), entry] = np.nextafter(w[np.arange(n), entry], towards)
     same = rng.random(n) < 0.1  # w = −v gains nothing and loses nothing
     w[same] = -v[same]
@@ -72,7 +73,9 @@ def near_the_border(
 def test_the_extracted_checker_judges_as_the_exact_judge_does(
     checker: Path, tmp_path: Path
 ) -> None:
-    rng, lines, gained = np.random.default_rng(11), [EXPORT_HEAD], []
+    rng = np.random.default_rng(11)
+    lines = [EXPORT_HEAD]
+    gained = []
     for d, decades in ((3, 0.0), (3, 150.0), (1, 300.0), (6, 10.0)):
         impacts = near_the_border(IMPACTS // 4, d, rng, decades)
         lines += exported(*impacts)
@@ -143,11 +146,9 @@ def test_what_is_no_file_of_impacts_is_refused(
 
 
 def test_exported_integers_are_the_doubles() -> None:
-    mass, v, w = (
-        np.array([[2.0, 5e-324], [-0.0, 1e308]]),
-        np.array([[1.5, -0.1]]),
-        np.array([[0.0, 3.0]]),
-    )
+    mass = np.array([[2.0, 5e-324], [-0.0, 1e308]])
+    v = np.array([[1.5, -0.1]])
+    w = np.array([[0.0, 3.0]])
     (line,) = exported(mass, v, w)
     size, *numbers = map(int, line.split())
     values = [np.ldexp(float(m), e) for m, e in zip(numbers[::2], numbers[1::2], strict=True)]

@@ -26,7 +26,8 @@ NAMES = {
     "q": letter("q"),
 }
 READER = Reader(NAMES)
-FACT, VALUE = READER.fact, READER.expression
+FACT = READER.fact
+VALUE = READER.expression
 DROPPED = ""  # the whole hypothesis
 
 CORRUPTED = [
@@ -99,8 +100,10 @@ def test_only_a_letter_is_defined(wrong: str) -> None:
 
 @pytest.mark.parametrize("name", all_proofs())
 def test_a_corrupted_certificate_is_refused_by_each_kernel(name: str) -> None:
-    statement, lines = Statement(layout.block(name)), certificates(name)
-    known, sympy = Known([*statement.given, *statement.definitions]), by_sympy.Text(statement.block)
+    statement = Statement(layout.block(name))
+    lines = certificates(name)
+    known = Known([*statement.given, *statement.definitions])
+    sympy = by_sympy.Text(statement.block)
     for index, task in enumerate(statement.tasks):
         if task.method:
             for source in infer(task.claim, task.method, known).sources:

@@ -9,11 +9,13 @@ from iapb import find_scene, simulate
 from verification.claims.conditions import Condition
 from verification.scenes import measures
 
-STEPS, DT = 100, 0.01
+STEPS = 100
+DT = 0.01
 
 
 def trace(device=None, velocity=None, force=None, contact_at=10, tool=None):
-    states, steps = np.zeros((STEPS + 1, 3)), np.zeros((STEPS, 3))
+    states = np.zeros((STEPS + 1, 3))
+    steps = np.zeros((STEPS, 3))
     new = np.zeros(STEPS, bool)
     new[contact_at] = True
     device = states if device is None else device
@@ -40,12 +42,14 @@ def column(values, index):
     return out
 
 
-UNTIL_50, FOREVER = column(np.arange(STEPS + 1) <= 50, 0), column(np.full(STEPS + 1, 0.1), 2)
+UNTIL_50 = column(np.arange(STEPS + 1) <= 50, 0)
+FOREVER = column(np.full(STEPS + 1, 0.1), 2)
 
 
 def test_distances_are_taken_in_the_window():
     late = np.where(np.arange(STEPS + 1) >= 20, 2e-3, 0.0)
-    ours, ideal = trace(device=column(late, 1)), trace()
+    ours = trace(device=column(late, 1))
+    ideal = trace()
     assert measures.root_mean_square(ours, ideal, slice(20, 60)) == pytest.approx([0.0, 2e-3, 0.0])
     assert measures.root_mean_square(ours, ideal, slice(0, 40)) == pytest.approx(
         [0.0, 2e-3 / np.sqrt(2), 0.0]
@@ -142,7 +146,8 @@ def test_a_start_has_the_clearance_and_the_travel_it_says(tilt):
 
 def test_penetration_is_that_of_the_deepest_contact():
     run = simulate(find_scene("peg_corner"))
-    depth, rows = measures.trace_of(run).penetration, run.contacts
+    depth = measures.trace_of(run).penetration
+    rows = run.contacts
     assert depth.max() > 0.0
     for k in range(run.steps):
         gaps = rows.gap[rows.offsets[k] : rows.offsets[k + 1]]

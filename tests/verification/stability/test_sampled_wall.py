@@ -18,11 +18,17 @@ def at(loop: study.Loop, stiffness: float, damping: float, law: str):  # type: i
 def test_motion_between_samples_is_that_of_the_differential_equation(b: float) -> None:
     loop = study.Loop(device_damping=b)
     free, moved, held = study._held_force(loop)
-    x, v, force, n = 0.3, -0.7, 1.1, 20_000
-    fine_x, fine_v, h = x, v, loop.step / n
+    x = 0.3
+    v = -0.7
+    force = 1.1
+    n = 20_000
+    fine_x = x
+    fine_v = v
+    h = loop.step / n
     for _ in range(n):  # midpoint rule, error h²
         half = fine_v + 0.5 * h * (force - b * fine_v) / loop.mass
-        fine_x, fine_v = fine_x + h * half, fine_v + h * (force - b * half) / loop.mass
+        fine_x = fine_x + h * half
+        fine_v = fine_v + h * (force - b * half) / loop.mass
     a = force / loop.mass
     assert x + moved * v + held * a == pytest.approx(fine_x, abs=1e-12)
     assert free * v + moved * a == pytest.approx(fine_v, abs=1e-10)
@@ -65,7 +71,8 @@ def test_rate_hardness_of_an_impulse_does_not_know_the_wall() -> None:
 
 @pytest.mark.parametrize("law", study.LAWS)
 def test_no_wall_within_the_condition_makes_the_hand_faster(law: str) -> None:
-    loop, (stiffness, damping) = study.Loop(device_damping=5.0), study.grid("quick")
+    loop = study.Loop(device_damping=5.0)
+    (stiffness, damping) = study.grid("quick")
     outcomes = study.maps_of(loop, stiffness, damping)[study.LAWS.index(law)].outcomes
     passive = loop.passive_damping(stiffness) >= damping[:, None]
     if law == study.PENALTY:

@@ -24,14 +24,19 @@ class UnilateralWall:
 
     def reset(self, dt: float) -> None:
         """Let go."""
-        self.dt, self.touches, self.begun = dt, False, False
-        self.at, self.rate = 0.0, 0.0
+        self.dt = dt
+        self.touches = False
+        self.begun = False
+        self.at = 0.0
+        self.rate = 0.0
 
     def step(self, x: float, v: float) -> float:
         """Return the force on the hand [N]."""
         engaged = self.touches or x > 0.0
         if not (engaged and self.begun):
-            self.at, self.rate, self.begun = x, v, True
+            self.at = x
+            self.rate = v
+            self.begun = True
         pull = self.stiffness * (x - self.at) + self.damping * (v - self.rate)
         pull = pull if engaged else 0.0
         free = self.rate + self.dt * pull / self.mass

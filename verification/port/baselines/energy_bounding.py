@@ -21,7 +21,9 @@ class EnergyBounding:
 
     def reset(self, dt: float) -> None:
         """Begin with an empty store."""
-        self.dt, self.energy, self.force = dt, 0.0, 0.0
+        self.dt = dt
+        self.energy = 0.0
+        self.force = 0.0
 
     def step(self, x: float, v: float) -> float:
         """Return the force on the hand [N]."""

@@ -26,7 +26,9 @@ class PassivityControl:
 
     def reset(self, dt: float) -> None:
         """Forget the energy."""
-        self.dt, self.taken, self.force = dt, 0.0, 0.0
+        self.dt = dt
+        self.taken = 0.0
+        self.force = 0.0
 
     def step(self, x: float, v: float) -> float:
         """Return the force on the hand [N]."""
