@@ -33,6 +33,7 @@ SLOW_CALLS = 30_000  # of the law in the search for slow hands
 STAGES = ("laws", "motions of the hand", "their improvement", "slow hands", "edge of the map")
 EDGE = 9  # points of the edge that are searched
 EDGE_CALLS = 25_000  # of the law for each of them
+REMEMBERS = ("repeatable", "waiting")  # laws whose counterexamples need a law without a past
 ENOUGH = 4  # motions that break the energy law, of which the shortest is shrunk
 SHRINKING = 5.0  # [s] for a counterexample
 
@@ -351,6 +352,9 @@ class _Trial:
             def breaks(motion: Motion, name: str = name, ends: float = ends) -> bool:
                 if time.monotonic() > ends:
                     return False
+                if child is not None and name in REMEMBERS:
+                    child.restart()
+                    port.play = child
                 residual, _ = residual_of(self.laws[name], motion, port, self.terms)
                 return residual is not None and not residual.passed
 
