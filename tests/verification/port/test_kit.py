@@ -81,9 +81,7 @@ def test_every_planted_fault_is_found_and_its_test_fails_in_a_fresh_process(tmp_
         (tmp_path / f"test_{number}.py").write_text(text)
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(tmp_path)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
-    assert f"{len(EVERY)} failed" in done.stdout and "passed" not in done.stdout, done.stdout[
-        -2000:
-    ]
+    assert f"{len(EVERY)} failed in" in done.stdout, done.stdout[-2000:]
 
 
 @pytest.mark.thorough
