@@ -35,7 +35,7 @@ COMMANDS = {
     "counterexample.",
     "verify-many": "Test the laws on a million impacts and thousands of trajectories; Ctrl-C lists what was found.",
     "verify-world": "Put a world to the laws of trajectories on random scenes.",
-    "port": "Test whether a force law is passive on a haptic device; print what it needs and draw the map.",
+    "port": "Search the motion of a hand that draws energy from a force law; draw the map of devices.",
     "compare": "Compare worlds on SCENE: distances, energy, time, and its impacts by every solver.",
     "solvers": "Put problem files to every complementarity solver; or compare IAPB with complementarity.",
     "bench": "Time a step, an impact and a motion; compare with MuJoCo, Pinocchio, solvers and the printed formula.",

@@ -21,13 +21,7 @@ sys.path.insert(0, str(Path(__file__).parent))  # importmode=importlib does not
 
 from performing import ROOT, read_blocks
 
-from iapb.scene import find_scene, load_scene
-from reference.worlds import run_world
 from reports.cli import main
-from reports.evidence.runs import TILTED
-from reports.figures.figure import draw, standalone
-from reports.figures.tilts import hero
-from verification.claims.conditions import IGNORED, Condition
 
 PICTURES = ROOT / "docs/pictures"
 DOCUMENTS = (
@@ -199,21 +193,12 @@ def test_extension(path, tmp_path):
     [
         ("fig01", "impulses_and_forces"),
         ("fig05", "couplings"),
-        ("scenes", "scenes"),
-        ("hero", "peg_in_the_corner"),
     ],
 )
 def test_pictures_show_the_runs_of_today(figure, name, shared):
     """What they say of themselves in words and numbers, such as the forces at the contacts."""
     drawn = shared / "figures" / f"{figure}.svg"
-    if figure == "hero":  # of the runs of one tilt
-        start = Condition()
-        scene = load_scene(find_scene("peg_corner"))
-        runs = {world: run_world(start.place(scene), world) for world in IGNORED}
-        drawn.parent.mkdir(exist_ok=True)
-        drawn.write_text(standalone(draw(hero, {TILTED: {start.tilt: runs}})), encoding="utf-8")
-    else:
-        assert main(["reproduce", "--figure", figure, "--out", str(drawn.parent)]) == 0
+    assert main(["reproduce", "--figure", figure, "--out", str(drawn.parent)]) == 0
     said, shown = (
         re.findall(r"<desc>(.*?)</desc>", path.read_text(encoding="utf-8"), flags=re.S)[0]
         for path in (drawn, PICTURES / f"{name}.svg")

@@ -179,7 +179,7 @@ class Report(str):
         raise NotImplementedError
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PassivityReport(Report):
     """Report of `check_passivity`.
 

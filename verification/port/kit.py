@@ -58,7 +58,7 @@ class ForceVerdict(LawCount):
         return f"  {mark} {self.law}: {self.statement}{worst}{fault}"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ForceReport(Report):
     """Report of `check_force`.
 
@@ -187,6 +187,12 @@ def check_force(
     -------
     ForceReport
         `passed`, the numbers, each law, and the smallest motion found, also as a test to paste.
+
+    Raises
+    ------
+    ArgumentError
+        The law is no function and has no `step`; a law's name is unknown; a coupled loop has
+        another rate than the device.
 
     Notes
     -----

@@ -142,7 +142,8 @@ def test_the_bands_bound_what_a_shorter_step_of_the_ideal_world_changes():
 
 @pytest.mark.parametrize(("milliseconds", "late"), [(0.9, (0, 0)), (1.5, (0, 5)), (2.5, (2, 2))])
 def test_the_two_deadlines_are_those_of_512_hz_and_1_khz(monkeypatch, milliseconds, late):
-    monkeypatch.setattr(growth, "_call", lambda *case: None)
+    monkeypatch.setattr(growth, "printed_call", lambda case: None)
+    monkeypatch.setattr(growth, "sampler", lambda call: lambda: 1e-3 * milliseconds)
     monkeypatch.setattr(growth, "seconds", lambda call: 1e-3 * milliseconds)
     rows = list(growth.haptic_rate(3, PRINTED, contacts=(6,), calls=5))
     assert {row["deadline"]: row["late calls [of 1000]"] for row in rows} == dict(
