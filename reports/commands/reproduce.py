@@ -30,7 +30,7 @@ from reports.runner import Runner
 from reports.show import Answer, Json, counted, stage_progress
 from reports.store.io import write_whole
 from reports.uses import parsed
-from verification.finding import Failure
+from verification.finding import REPRODUCED, Failure, Finding
 
 SHOWN_FAILURES = 20  # of a stage, in the last lines
 
@@ -105,7 +105,7 @@ def make_report(out: Path, depth: str) -> Answer:
     counts = count_claims(evidence.claims)
     lines = [
         *(f"Claims, {kind}: {count}." for kind, count in counts.items() if count),
-        *(f"{topic.title}: {topic.answer}" for topic in evidence.topics),
+        *(_line_of(topic) for topic in evidence.topics),
         f"\n{path} ({path.stat().st_size / 1e6:.1f} MB, from {len(evidence.runs)} runs) in {ended - started:.0f} s.",
         f"Beside it: {', '.join(file.name for file in beside)}.",
         f"Seconds by part: {', '.join(f'{part} {seconds:.0f}' for part, seconds in took.items())}.",
@@ -131,6 +131,12 @@ def make_report(out: Path, depth: str) -> Answer:
     tables = [path.relative_to(out).as_posix() for path in (out / "tables").glob("*.h5")]
     keep_answer(out, key, facts, lines, [*(f"runs/{run.file}" for run in evidence.runs), *tables])
     return Answer(facts, lines)
+
+
+def _line_of(topic: Finding) -> str:
+    """Return how many parts of a topic hold."""
+    held = sum(part.verdict == REPRODUCED for part in topic.parts)
+    return f"{topic.title}: {held} of {len(topic.parts)} parts hold."
 
 
 def _failure_lines(failed: Sequence[FailedCases]) -> Iterator[str]:
