@@ -15,8 +15,7 @@ from verification.port.baselines.midpoint_wall import MidpointWall
 from verification.port.baselines.penalty import PenaltyWall
 
 CLOSE = 0.99  # the bar of the search: at least this share of what is needed
-# The bar for random laws: of 43 walls one, in the plane, reached 0.987, and of 21 tables all 0.994.
-FOUND = 0.95
+MISSED = 19  # the wall, in the plane, that the search brings to 0.987 only
 IMPLICIT = 1.0 + (B + K * T) * T / 0.1
 HESSIAN = np.array([[1500.0, 400.0], [400.0, 900.0]])
 
@@ -105,9 +104,12 @@ def test_random_linear_walls(k):
     start = [0.0, 0.0] if np.ndim(law.stiffness) else 0.0
     need = law.need(device)
     report = check_force(law, device, start=start, laws=["energy"])
-    assert FOUND * need <= report.damping_needed <= 1.0005 * max(need, 0.0)
+    assert report.damping_needed <= 1.0005 * max(need, 0.0)
     alarm = replace(device, damping=1.001 * max(need, 0.0))
     assert check_force(law, alarm, start=start, laws=["energy"], seed=k).passed
+    if k == MISSED and 0.95 * need <= report.damping_needed < CLOSE * need:
+        pytest.xfail("the search falls short of the bar on this wall")
+    assert report.damping_needed >= CLOSE * need
 
 
 @pytest.mark.thorough
@@ -117,7 +119,7 @@ def test_random_force_tables(k):
     need = law.need(device)
     options = {"laws": ["energy"], "stored": law.stored}
     report = check_force(law, device, **options)
-    assert FOUND * need <= report.damping_needed <= 1.0005 * need
+    assert CLOSE * need <= report.damping_needed <= 1.0005 * need
     alarm = replace(device, damping=1.001 * need)
     assert check_force(law, alarm, seed=k, **options).passed
 
