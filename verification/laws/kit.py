@@ -176,6 +176,7 @@ class Report(str):
             raise AssertionError(str(self))
 
     def _text(self) -> str:
+        """Return what the report prints; each kind of report writes its own text."""
         raise NotImplementedError
 
 
