@@ -99,7 +99,7 @@ def _impacts(study: Study, size: Size) -> Iterator[Row]:
             spent.setdefault(name, []).extend(taken.samples)
             ratios.setdefault(name, []).extend(times[ours].over(taken).samples)
             apart[name] = max(apart.get(name, 0.0), case.distance(answers[name], answers[ours]))
-            if taken.median > 0.25 * LONGEST[study.depth]:
+            if name != ours and taken.median > 0.25 * LONGEST[study.depth]:
                 slow.add((size.impacts, name))
     for name in spent:
         if name != ours:

@@ -9,9 +9,10 @@ import pytest
 from iapb.system import System
 from reference.mujoco import joint_places, set_state
 from verification.check import Study
+from verification.clock import Times
 from verification.cost import growth, impact_times, steps
-from verification.cost.accuracy import BUDGET_ROWS, COMPILED, LEMKE, PYTHON, Stopped
-from verification.cost.calls import PRINTED
+from verification.cost.accuracy import BUDGET_ROWS, COMPILED, IAPB, LEMKE, PYTHON, Stopped
+from verification.cost.calls import PRINTED, Call
 from verification.cost.resting import RESTING
 from verification.cost.steps import OwnLoop
 from verification.table import table_from
@@ -118,3 +119,16 @@ def test_methods_that_are_called_in_one_way_are_timed_on_the_same_impact(called:
     )
     assert all(row["apart"] < impact_times.SOLVED for row in rows)
     assert all(row["lower quartile"] <= row["ratio"] <= row["upper quartile"] for row in rows)
+
+
+def test_our_method_is_never_dropped_since_the_others_are_compared_with_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def only_ours_is_slow(made: dict[str, Call], *_: object, **__: object) -> dict[str, Times]:
+        return {name: Times((1.0 if name == IAPB else 1e-6,) * 3) for name in made}
+
+    monkeypatch.setattr(impact_times, "take_turns", only_ours_is_slow)
+    study = Study()
+    for _ in range(2):
+        [row] = impact_times.compare(study, impact_times.Size("patch", COMPILED, 1))
+        assert row["method"] == LEMKE
