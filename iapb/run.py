@@ -51,7 +51,12 @@ class ContactTable:
     ]
     body_a: Annotated[Integers, quantity("contact", "1", "moving body that the normal points into")]
     body_b: Annotated[Integers, quantity("contact", "1", "other body, -1 = the static world")]
-    point: Annotated[Floats, quantity("contact axis", "m", "contact point, world axes")]
+    point: Annotated[
+        Floats,
+        quantity(
+            "contact axis", "m", "contact point, world axes; with an impulse: where it struck"
+        ),
+    ]
     normal: Annotated[Floats, quantity("contact axis", "1", "unit normal, from b into a")]
     gap: Annotated[Floats, quantity("contact", "m", "distance, negative = overlap")]
     normal_velocity: Annotated[

@@ -180,6 +180,8 @@ def copy_all(to, i, contacts, j):
     to.expected[i] = contacts.expected[j]
     to.span[i] = contacts.span[j]
     to.lift[i] = contacts.lift[j]
+    store(to.struck_point, i, load(contacts.struck_point, j))
+    store(to.struck_normal, i, load(contacts.struck_normal, j))
     store(to.friction_force, i, load(contacts.friction_force, j))
     store(to.point_a, i, load(contacts.point_a, j))
     store(to.point_b, i, load(contacts.point_b, j))

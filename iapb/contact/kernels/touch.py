@@ -649,6 +649,8 @@ def take_contacts(world, state):
         if old >= 0:
             begin = old + 1
             state.contact_impulse[kept] = state.row_impulse[old]
+            store(now.struck_point, kept, load(before.struck_point, old))
+            store(now.struck_normal, kept, load(before.struck_normal, old))
         kept += 1
     state.contact_count[0] = kept
     return True
