@@ -12,7 +12,6 @@ import pytest
 from iapb.advice.checks import Start, check_scene, step_limits
 from iapb.contact.laws import ImpulseAugmented
 from iapb.scene import Scene, SpatialScene, find_scene, load_scene, scene_names
-from iapb.simulation import simulate
 
 FLOOR = {"name": "floor", "kind": "half_plane", "point": [0, 0], "normal": [0, 1]}
 PLATE = {"name": "plate", "kind": "box", "size": [1.0, 0.05], "center": [0, 0]}
@@ -208,10 +207,6 @@ def test_a_law_hears_nothing_of_what_it_does_not_use() -> None:
     assert not check_scene(WARNED["too stiff"][0], rigid) and not check_scene(LANDING, ROUGH)
 
 
-def test_friction_in_its_impact_shortens_the_way_of_a_body_that_lands_sliding() -> None:
-    assert simulate(LANDING).q[-1, 0] - simulate(LANDING, ROUGH).q[-1, 0] > 0.05 * SIDE
-
-
 # Limits of the step
 
 
@@ -313,6 +308,3 @@ walls:
     assert {one.where for one in check_scene(SpatialScene.model_validate(spatial))} == {
         "bodies.box_0.rpy[1]"
     }
-
-
-# What implicit contact chooses

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from iapb.advice.distrust import UNACCOUNTED, distrust_of
+from iapb.advice.distrust import distrust_of
 from iapb.run import Run
 from iapb.scene import Scene, SpatialScene
 from iapb.simulation import simulate
@@ -129,44 +129,6 @@ def test_a_deep_landing_is_right_while_its_step_explains_it_and_it_fades() -> No
     assert "all of 100 mm" in whole, "no landing is that deep"
     springs = run.scene_resolved | {"contact": {"forces": "paper", "stiffness": 1e4}}
     assert distrust_of(replace(run, scene_resolved=springs))
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("thick", [0.002, 0.01, 0.05])
-@pytest.mark.parametrize("rate", [250.0, 1000.0])
-@pytest.mark.parametrize("e", [0.0, 0.7])
-def test_a_stick_that_a_floor_stops_within_its_thickness_is_right(
-    thick: float, rate: float, e: float
-) -> None:
-    """Law: it leaves with e times its speed, to where a free flight from the floor ends but for the
-    way of two steps. Its tenth step ends 0.8 thicknesses inside the floor."""
-    way = 1.2 * thick
-    stick = body("stick", {"kind": "box", "size": [1.0, thick]}, [0, 0], [0, -way * rate])
-    stick |= {"inertia": 0.2 / 12.0, "position": [0, 0.5 * thick + 10.0 * way - 0.8 * thick, 0]}
-    floor = {"name": "floor", "kind": "half_plane", "point": [0, 0], "normal": [0, 1]}
-    run = run_of(stick, walls=[floor], steps=40, rate=rate, contact={"restitution": e})
-    due = 0.5 * thick + e * (30.0 * way + 0.8 * thick)
-    assert run.v[-1, 1] == pytest.approx(e * way * rate, abs=UNACCOUNTED * way * rate)
-    assert run.q[-1, 1] == pytest.approx(due, abs=2.0 * way)
-    assert run.distrust == ()
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("k", [0, 1, 2])
-@pytest.mark.parametrize("rate", [1000.0, 4000.0])
-@pytest.mark.parametrize("radius", [0.03, 0.1])
-def test_two_masses_and_a_wall_count_the_digits_of_pi(k: int, rate: float, radius: float) -> None:
-    """Law (Galperin 2003): masses 1 and 100^k collide as often as the first k + 1 digits of pi
-    say. The small one goes at most 0.6 of its width in a step."""
-    shape = {"kind": "circle", "radius": radius}
-    speed = 1.2 * radius * rate / 10.0**k
-    small = body("small", shape, [-0.5, 0], [], mass=1.0)
-    large = body("large", shape, [-0.8, 0], [speed], mass=100.0**k)
-    wall = {"name": "wall", "kind": "half_plane", "point": [0, 0], "normal": [-1, 0]}
-    steps = round(5.0 / speed * rate)
-    run = run_of(small, large, walls=[wall], steps=steps, rate=rate, contact={"restitution": 1.0})
-    assert len(run.impacts.step) == int(math.pi * 10**k)
-    assert run.distrust == ()
 
 
 def test_a_joint_beyond_its_limit_is_seen() -> None:
@@ -311,21 +273,6 @@ PASSAGES: dict[str, tuple[list[Any], list[Any], str]] = {
         ],
         "a passes through plate",
     ),
-    "ends of two plates": (
-        [body("a", {"kind": "box", "size": [0.1, 0.01]}, HIGH, DOWN)],
-        plate(0.1, 0.01, center=[0.09, 0]),
-        "a passes through plate",
-    ),
-    "box, round post": (
-        [body("a", {"kind": "box", "size": [0.02, 0.02]}, [0.004, 0.1], [0, -60.0])],
-        [{"name": "post", "kind": "circle", "radius": 0.004}],
-        "a passes through post",
-    ),
-    "box, ball that stands": (
-        [body("a", CUBE, [0.002, 0.002, 0.1], [0, 0, -40.0])],
-        [{"name": "knob", "kind": "sphere", "radius": 0.004}],
-        "a passes through knob",
-    ),
     "disc, moving plate": (
         [
             body("a", DISC, UP, [0, -21.0]),
@@ -355,24 +302,14 @@ PASSAGES: dict[str, tuple[list[Any], list[Any], str]] = {
 }
 
 
-for turned in (
-    0.0,
-    0.5,
-    -2.0,
-):  # a ball 10 mm beside its body, 40 mm in a step, through a plate or past its end
-    c = math.cos(turned)
-    s = math.sin(turned)
-    for kind, form in (
-        ("box", {"size": [0.2, 0.004]}),
-        ("polygon", {"vertices": [[-0.1, -0.002], [0.1, -0.002], [0.1, 0.002], [-0.1, 0.002]]}),
-    ):
-        for along, said in ((0.05, "ball passes through plate in the step to 0.003 s"), (0.12, "")):
-            start = [0.3 + c * along - s * 0.1 - 0.01, 0.2 + s * along + c * 0.1]
-            PASSAGES[f"ball, {kind} turned by {turned}, {along} from its middle"] = (
-                [body("ball", DISC | {"center": [0.01, 0]}, start, [40.0 * s, -40.0 * c])],
-                [{"name": "plate", "kind": kind, "center": [0.3, 0.2], "angle": turned, **form}],
-                said,
-            )
+# a ball 10 mm beside its body, 40 mm in a step, through a turned plate or past its end
+TILTED = {"name": "plate", "kind": "box", "center": [0.3, 0.2], "angle": -2.0, "size": [0.2, 0.004]}
+c = math.cos(-2.0)
+s = math.sin(-2.0)
+for along, said in ((0.05, "ball passes through plate in the step to 0.003 s"), (0.12, "")):
+    start = [0.3 + c * along - s * 0.1 - 0.01, 0.2 + s * along + c * 0.1]
+    ball = body("ball", DISC | {"center": [0.01, 0]}, start, [40.0 * s, -40.0 * c])
+    PASSAGES[f"ball, turned plate, {along} from its middle"] = ([ball], [TILTED], said)
 PASSAGES["upside down in space"] = (
     [
         body("ball", BALL | {"center": [0, 0, 0.03]}, [0, 0, 0], [0, 0, 40.0])
@@ -390,8 +327,7 @@ def test_a_body_that_passes_through_another_within_a_step_is_seen(name: str) -> 
     assert [why[: len(said)] for why in found] == ([said] if said else [])
 
 
-# The box that meets the post beside its middle spins off at 3,600 rad/s: no straight path.
-@pytest.mark.parametrize("name", [name for name in PASSAGES if name != "box, round post"])
+@pytest.mark.parametrize("name", PASSAGES)
 def test_none_passes_where_impacts_happen_at_the_touch(name: str) -> None:
     bodies, walls, _ = PASSAGES[name]
     assert not any("passes" in why for why in run_of(*bodies, walls=walls).distrust)
@@ -412,10 +348,8 @@ def test_a_wall_that_is_wholly_inside_a_body_is_seen() -> None:
     ("shape", "wide", "friction", "said"),
     [
         ({"kind": "circle", "radius": 0.035}, 0.06, 0.0, "10 mm narrower"),
-        ({"kind": "circle", "radius": 0.0301}, 0.06, 0.0, ""),
         ({"kind": "box", "size": [SIDE, SIDE]}, 0.06, 0.0, "40 mm narrower"),
         ({"kind": "box", "size": [SIDE, SIDE]}, 0.06, 0.5, ""),  # friction holds it there
-        ({"kind": "box", "size": [SIDE, SIDE]}, 0.095, 0.0, ""),
         ({"kind": "box", "size": [SIDE, SIDE]}, 0.11, 0.0, ""),
     ],
 )

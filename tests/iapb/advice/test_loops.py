@@ -169,16 +169,10 @@ GROWING: dict[str, tuple[Scene, str, dict[str, Any]]] = {  # scene, what is said
         "while tool and wall touch",
         {"couplings.four_channel": {"stiffness": [140.0], "damping": [5.8]}},
     ),
-    "slow": (slider(800, 5, mass=0.2, rate=200, delay=1), "1 step each", {"rate": 410}),
     "coupler": (
         slider(2000, 10, kind="unilateral", mass=0.2, delay=5),
         "unilateral",
         {"device.delay": 2},
-    ),
-    "slow coupler": (
-        slider(5000, 20, kind="unilateral", mass=1.0, rate=500, delay=3),
-        "unilateral",
-        {"couplings.unilateral.stiffness": [1400.0]},
     ),
     "soft wall": (
         slider(2000, 10, mass=0.3, delay=5, contact=SOFT),
@@ -186,11 +180,6 @@ GROWING: dict[str, tuple[Scene, str, dict[str, Any]]] = {  # scene, what is said
         {"device.delay": 3},
     ),
     "plate": (plate([800, 800, 0.2], [8, 8, 2e-3], delay=8), "plate and wall", {"device.delay": 4}),
-    "turned plate": (
-        plate([100, 100, 3], [10, 10, 2e-3], delay=8),
-        "plate.theta",
-        {"couplings.four_channel.stiffness.2": 0.11},
-    ),
     "arm": (arm(20, 0.1, delay=8), "tool and device", {"device.delay": 1}),
     "limited": (slider(1500, 10, delay=6, force_limit=[5.0]), "6 steps", {"device.delay": 1}),
     # too much stiffness or damping for the step
@@ -199,34 +188,15 @@ GROWING: dict[str, tuple[Scene, str, dict[str, Any]]] = {  # scene, what is said
         "B Δt/(m/2) = 2.5",
         {"couplings.four_channel.damping": [130.0]},
     ),
-    "rate": (slider(100, 40, mass=0.15, rate=250), "B Δt/(m/2) = 2.13", {"rate": 410}),
     "stiffness": (
         slider(2.5e5, 1, damping=[0.0]),
         "in free motion",
         {"couplings.four_channel.stiffness": [1.3e5]},
     ),
-    "together": (slider(1e5, 70), "in free motion", {"couplings.four_channel.damping": [16.0]}),
-    "damped coupler": (
-        slider(300, 90, kind="unilateral", delay=1),
-        "1 step each",
-        {"couplings.unilateral.damping": [39.0]},
-    ),
-    "damping, soft wall": (
-        slider(1000, 110, contact=SOFT),
-        "= 2.2",
-        {"couplings.four_channel.damping": [64.0]},
-    ),
     "damped turn": (
         plate([100, 100, 0.5], [10, 10, 0.3]),
         "plate.theta",
         {"couplings.four_channel.damping": [10.0, 10.0, 0.13]},
-    ),
-    "damped plate": (plate([100, 100, 0.5], [600, 600, 0.01]), "= 2.4", {"rate": 1900}),
-    "damped arm": (arm(4, 3.0), "lower.angle", {"rate": 5600}),
-    "damping, limited": (
-        slider(1000, 150, force_limit=[5.0]),
-        "= 3 ",
-        {"couplings.four_channel.damping": [63.0]},
     ),
 }
 

@@ -5,12 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from iapb.contact.laws import Penalty
-from iapb.effects import decide_effects, ignored_fields
 from iapb.scene import Scene, scene_from_text
 from iapb.simulation import simulate
-from iapb.system import System
-from iapb.worlds import find_world
 
 G = 9.81
 SLIDE = """name: slide
@@ -102,15 +98,3 @@ def test_friction_of_a_follower_is_that_of_its_leader_times_the_multiplier() -> 
     )
     run = simulate(scene_from_text(text))
     assert run.v[-1, 0] == pytest.approx(-(1.25 * G - 3.0) / (1.25 + 0.25 * 4.0), rel=1e-9)
-
-
-@pytest.mark.parametrize("friction", [0.0, 1.0])
-def test_friction_that_is_zero_costs_no_switch(friction: float) -> None:
-    switches = System(slide(friction)).world_under(Penalty()).switches
-    assert bool(switches.joint_friction) is (friction > 0.0)
-
-
-def test_a_law_without_joint_friction_says_that_it_ignores_it() -> None:
-    rigid = find_world("ideal-friction").law
-    assert ignored_fields(decide_effects(slide(1.0), law=rigid)) == ("joint_friction",)
-    assert ignored_fields(decide_effects(slide(1.0), law=Penalty())) == ()

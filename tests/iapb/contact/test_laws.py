@@ -135,12 +135,6 @@ def test_equal_restitution_changes_no_bit_wherever_it_is_written(e: float) -> No
         )
 
 
-def test_friction_in_impacts_is_the_scenes_choice() -> None:
-    for forces in ("paper", "implicit"):
-        scene = BAR.with_values({"contact.forces": forces, "contact.friction": 0.2})
-        assert ImpulseAugmented().within(scene).friction_in_impacts is (forces == "implicit")
-
-
 # --- energy over a run
 # -----------------------------------------------------------------------------------------------
 

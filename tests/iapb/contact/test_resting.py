@@ -3,13 +3,12 @@ slides, dissipates."""
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 import pytest
 
-from iapb.contact.laws import INTEGRATORS, ImpulseAugmented, Penalty
+from iapb.contact.laws import Penalty
 from iapb.run import Run
 from iapb.scene import Scene
 from iapb.simulation import simulate
@@ -17,7 +16,6 @@ from iapb.system import System
 from tests.iapb.contact.paper import scene_of
 
 FLOOR = {"name": "floor", "kind": "half_plane", "point": [0, 0], "normal": [0, 1]}
-CREEP = 1e-10  # [m/s] docs/theory.md: slower slip sticks
 
 
 def sliders(seed: int, count: int | None = None, **contact: Any) -> Scene:
@@ -159,90 +157,3 @@ def test_implicit_forces_solve_the_complementarity_problem(seed: int) -> None:
         assert p == 0.0 or opened <= 1e-7 * size
         some += p > 0.0
     assert some > 4
-
-
-def on_slope(degrees: float, mu: float, v: float = 0.0, **contact: Any) -> Scene:
-    """A box on a level floor, under tilted gravity, at speed v along it."""
-    a = math.radians(degrees)
-    sag = 5e-4 if "stiffness" in contact else 0.0
-    body = {
-        "name": "box",
-        "joint": "planar",
-        "mass": 2.0,
-        "inertia": 5e-3,
-        "position": [0, 0.025 - sag, 0],
-        "velocity": [v, 0, 0],
-        "shapes": [{"kind": "box", "size": [0.15, 0.05]}],
-    }
-    return scene_of(
-        [body],
-        [FLOOR],
-        duration=1.0,
-        gravity=[9.81 * math.sin(a), -9.81 * math.cos(a)],
-        contact={"friction": mu, "coherence_distance": 2e-3} | contact,
-    )
-
-
-def test_implicit_friction_creeps_below_the_stated_speed() -> None:
-    sticks = simulate(on_slope(20.0, 0.5))
-    late = sticks.q[800:]
-    assert abs(late[-1] - late[0])[0] < CREEP and sticks.friction_force[-1].any()
-
-
-def test_a_body_that_a_hand_holds_does_not_fall() -> None:
-    given = {"bodies.box.position": [0, 1, 0], "hand": {"body": "box", "force": [0, 2.0 * 9.81, 0]}}
-    assert np.ptp(simulate(on_slope(0.0, 0.5).with_values(given)).q[:, 1]) <= 1e-12
-
-
-@pytest.mark.parametrize("integrator", INTEGRATORS)
-@pytest.mark.parametrize(("slope", "v"), [(20.0, 0.0), (0.0, 0.2), (20.0, -0.3)])
-def test_a_box_stops_and_sticks_under_every_integrator(
-    integrator: str, slope: float, v: float
-) -> None:
-    """After v² / 2a, a = μ g cos α, up the slope + g sin α."""
-    run = simulate(on_slope(slope, 0.5, v), ImpulseAugmented(integrator=integrator))
-    a = math.radians(slope)
-    slows = 9.81 * (0.5 * math.cos(a) + math.sin(a) * (v < 0.0))
-    late = run.q[800:, 0]
-    assert np.ptp(late) < 1e-9 and np.abs(run.v[800:, 0]).max() < 1e-9
-    assert late[-1] == pytest.approx(
-        math.copysign(0.5 * v**2 / slows, v), abs=1.5 * abs(v) * run.dt + 5e-5
-    )
-    assert np.diff(run.energy["friction_work"], prepend=0.0).max() <= 1e-15
-
-
-@pytest.mark.parametrize(
-    "masses", [(1.0, 1.0, 1.0, 1.0), (1e-3, 1e3, 1.0, 1e2), (1e3, 1e-3, 1e-3, 1.0)]
-)
-def test_friction_takes_energy_whether_or_not_its_limits_have_settled(
-    masses: tuple[float, ...],
-) -> None:
-    """A pile of a cuboid and balls on a floor; F_f never pushes along the slip."""
-    shapes = [{"kind": "box", "size": [0.4, 0.4, 0.2]}, *[{"kind": "sphere", "radius": 0.1}] * 3]
-    places = [[0, 0, 0.099], [-0.15, 0.02, 0.347], [0, 0.02, 0.297], [0.15, 0.02, 0.347]]
-    bodies = [
-        {
-            "name": f"b{k}",
-            "joint": "free_flyer",
-            "mass": m,
-            "inertia": [0.01 * m, 0.02 * m, 0.03 * m],
-            "shapes": [shape],
-            "position": [*place, 0, 0, 0, 1],
-        }
-        for k, (m, shape, place) in enumerate(zip(masses, shapes, places, strict=True))
-    ]
-    floor = {"name": "floor", "kind": "half_space", "point": [0, 0, 0], "normal": [0, 0, 1]}
-    scene = scene_of(
-        bodies,
-        [floor],
-        gravity=[2, 1, -9.81],
-        integrator="semi_implicit_euler",
-        duration=0.02,
-        contact={"stiffness": 2000, "damping": 5, "friction": 0.6},
-    )
-    run = simulate(scene, Penalty())
-    for after, force in zip(run.v[1:], run.friction_force, strict=True):
-        # what sticks follows the arc of its step, and J v the tangent: an angle of |ω| Δt
-        turned = np.abs(after.reshape(-1, 6)[:, 3:]).max() * run.dt
-        assert force @ after <= turned * np.abs(force) @ np.abs(after)
-    assert run.friction_force.any()

@@ -1,10 +1,9 @@
-"""Contact without a given stiffness: what stands stays, what sticks stays, seams are no walls, links
-of one tree meet."""
+"""Contact without a given stiffness: what sticks on a moving body stays, a ledge is a wall, links of
+one tree meet. What stands and what crosses seams: verification/ordinary."""
 
 from __future__ import annotations
 
 import json
-import math
 from dataclasses import replace
 from typing import Any
 
@@ -35,34 +34,6 @@ def box(name: str, x: float, y: float, **values: Any) -> Values:
     return given | {"position": [x, y, 0]} | values
 
 
-# What stands
-
-STACKS = {
-    "two": [(0.0, 100), (0.01, 100)],
-    "two, far off centre": [(0.0, 100), (0.04, 100)],
-    "two, to the left": [(0.0, 100), (-0.02, 100)],
-    "three": [(0.0, 100), (0.01, 100), (0.02, 100)],
-    "three, to and fro": [(0.0, 100), (0.03, 100), (0.0, 100)],
-    "heavy on light": [(0.0, 100), (0.01, 1000)],
-    "light on heavy": [(0.0, 1e4), (0.01, 1)],
-    "far heavier on light, straight": [(0.0, 1e-1), (0.0, 1e5)],
-    "light between heavy, straight": [(0.0, 1e3), (0.0, 1), (0.0, 1e3)],
-    "five": [(0.0, 100), (0.005, 100), (-0.005, 100), (0.01, 100), (0.0, 100)],
-}
-
-
-@pytest.mark.parametrize("rate", [250, 1000])
-@pytest.mark.parametrize("name", STACKS)
-def test_a_stack_without_friction_stands_for_twenty_seconds(name: str, rate: int) -> None:
-    """No force along the faces acts; only a tilt by compliance could make a box slide, g θ t²/2."""
-    bodies = [
-        box(f"b{k}", x, 0.05 + 0.1 * k, density=density)
-        for k, (x, density) in enumerate(STACKS[name])
-    ]
-    run = simulate(made(bodies, [FLOOR], gravity=[0, -G], duration=20.0, rate=rate))
-    assert np.abs(run.pose - run.pose[0]).max() < 1e-3 and run.distrust == ()
-
-
 # What sticks
 
 
@@ -87,11 +58,6 @@ def turning(w: float) -> list[Values]:
     return [table(joint="revolute", axis=[0, 0, 1], velocity=[w]), flat]
 
 
-def carried(speed: float) -> list[Values]:
-    flat = coin([0.1, 0, 0.002], [0, 0, 0, 1], [speed, 0, 0, 0, 0, 0])
-    return [table(joint="prismatic", axis=[1, 0, 0], velocity=[speed]), flat]
-
-
 def rocking(angle: float) -> list[Values]:
     """A plank that swings like a pendulum, with the coin beside its axis."""
     turn = Rotation.from_rotvec([angle, 0, 0])
@@ -102,35 +68,27 @@ def rocking(angle: float) -> list[Values]:
     return [plank | {"shapes": [shape]}, coin(place, turn.as_quat().tolist(), [0.0] * 6)]
 
 
-BASES = {
-    "turntable at 33 rpm": (turning(33 / 60 * 2 * math.pi), 5.0),
-    "turntable at 6 rad/s": (turning(6.0), 5.0),
-    "turntable backwards": (turning(-5.0), 5.0),
-    "conveyor": (carried(0.5), 5.0),
-    "rocking plank": (rocking(0.25), 5.0),
-    "rocking plank, steeper": (rocking(0.4), 5.0),
-}
+MOVING = {"turntable": turning(6.0), "rocking plank": rocking(0.4)}
 
 
-@pytest.mark.parametrize("rate", [250, 1000, 4000])
-@pytest.mark.parametrize("name", BASES)
+@pytest.mark.parametrize("rate", [250, 4000])
+@pytest.mark.parametrize("name", MOVING)
 def test_what_sticks_on_a_moving_body_keeps_its_place(name: str, rate: int) -> None:
     """The way of the points in a step bends by ω² r Δt²/2; what may be left of it is ω Δt of this
     distance, once, not in every step."""
-    bodies, duration = BASES[name]
-    scene = made(bodies, gravity=DOWN, duration=duration, rate=rate, contact={"friction": 0.8})
+    values = {"gravity": DOWN, "duration": 5.0, "contact": {"friction": 0.8}}
+    scene = made(MOVING[name], rate=rate, **values)
     run = simulate(scene, every=10)
     turn = Rotation.from_quat(run.pose[:, 0, 3:]).inv()
     place = turn.apply(run.pose[:, 1, :3] - run.pose[:, 0, :3])
     assert np.abs(place - place[0]).max() < 100.0 / rate**2 and run.distrust == ()
 
 
-@pytest.mark.parametrize("moment", [1e-4, 3e-3])
-def test_friction_that_only_turns_a_velocity_drives_nothing(moment: float) -> None:
+def test_friction_that_only_turns_a_velocity_drives_nothing() -> None:
     """On a light table the work of friction, booked by the way of the velocity after it, is a share
     of the energy; what more it did is seen."""
     plate, flat = turning(6.0)
-    light = plate | {"mass": 0.05, "inertia": [moment] * 3}
+    light = plate | {"mass": 0.05, "inertia": [1e-4] * 3}
     values = {"gravity": DOWN, "duration": 20.0, "rate": 250, "contact": {"friction": 0.8}}
     run = simulate(made([light, flat], **values))
     booked = run.energy["friction_work"]
@@ -142,52 +100,10 @@ def test_friction_that_only_turns_a_velocity_drives_nothing(moment: float) -> No
 # Seams
 
 
-def tiles(count: int, width: float, space: bool) -> list[Values]:
-    size, lift = ([width, 2.0, 0.1], [0.0, -0.05]) if space else ([width, 0.1], [-0.05])
-    return [
-        {"name": f"t{k}", "kind": "box", "size": size, "center": [width * (k - 1), *lift]}
-        for k in range(count)
-    ]
-
-
-def thrown(shape: str, space: bool, speed: float, drop: float) -> Values:
-    mass = 0.2
-    half = 0.025
-    size = [0.1, 0.08, 0.05] if space else [0.1, 0.05]
-    kind = {"box": {"kind": "box", "size": size}}
-    kind["ball"] = {"kind": "sphere" if space else "circle", "radius": half}
-    moment = mass * 0.0012
-    given: Values = {"name": "thrown", "mass": mass, "shapes": [kind[shape]]}
-    if not space:
-        start = {"position": [0.043, half + 0.05, 0], "velocity": [speed, -drop, 0]}
-        return given | {"joint": "planar", "inertia": moment} | start
-    start = {
-        "position": [0.043, 0, half + 0.05, 0, 0, 0, 1],
-        "velocity": [speed, 0, -drop, 0, 0, 0],
-    }
-    return given | {"joint": "free_flyer", "inertia": [moment] * 3} | start
-
-
-@pytest.mark.parametrize("space", [False, True], ids=["plane", "space"])
-@pytest.mark.parametrize("width", [0.2, 0.07])
-@pytest.mark.parametrize(("speed", "drop"), [(1.5, 1.0), (0.5, 2.0), (3.0, 0.2)])
-@pytest.mark.parametrize("shape", ["box", "ball"])
-def test_what_lands_crosses_the_seams_of_tiles_as_one_floor(
-    shape: str, speed: float, drop: float, width: float, space: bool
-) -> None:
-    """On one floor and on tiles the motion is the same, to rounding and the limits of friction."""
-    body = thrown(shape, space, speed, drop)
-    values = {"gravity": DOWN if space else [0, -G], "duration": 0.5, "contact": {"friction": 0.1}}
-    on_tiles, on_floor = (
-        simulate(made([body], walls, **values)).pose[-1, 0]
-        for walls in (tiles(int(2.5 / width), width, space), tiles(3, 3.0, space))
-    )
-    assert np.abs(on_tiles - on_floor).max() < 1e-3
-
-
 def test_a_ledge_above_the_overlap_is_a_wall() -> None:
     ledge = {"name": "ledge", "kind": "box", "size": [1, 0.1], "center": [0.8, -0.05 + 0.004]}
-    body = thrown("box", False, 1.5, 1.0)
+    shape = {"kind": "box", "size": [0.1, 0.05]}
+    body = box("slid", 0.043, 0.075, velocity=[1.5, -1.0, 0], shapes=[shape])
     values: Values = {"gravity": [0, -G], "duration": 0.5}
     run = simulate(made([body], [FLOOR, ledge], **values))
     assert run.q[-1, 0] < 0.3 - 0.05 + 1e-3
@@ -216,11 +132,10 @@ def fingers(push: float, **values: Any) -> Scene:
     return made(bodies, hand={"body": "l", "force": [push, 0, 0]}, duration=1.0, **values)
 
 
-@pytest.mark.parametrize("push", [0.1, 2.0, 50.0])
-def test_a_finger_stops_at_the_other(push: float) -> None:
-    run = simulate(fingers(push))
+def test_a_finger_stops_at_the_other() -> None:
+    run = simulate(fingers(2.0))
     assert (run.q[:, 2] - run.q[:, 1]).min() > 0.02 - 2.0 * np.abs(run.v).max() * run.dt
-    through = simulate(fingers(push, contact={"self_collisions": False}))
+    through = simulate(fingers(2.0, contact={"self_collisions": False}))
     assert through.q[-1, 2] - through.q[-1, 1] < 0.0
 
 
@@ -235,13 +150,6 @@ def chain(turns: list[float]) -> Scene:
         for k, turn in enumerate(turns)
     ]
     return made(bodies, gravity=[0, -G], duration=1.0)
-
-
-@pytest.mark.parametrize("turn", [1.5, 1.8, 2.0])
-def test_a_chain_does_not_fold_through_itself(turn: float) -> None:
-    run = simulate(chain([0.0, turn, turn]))
-    own = run.contacts.body_b >= 0
-    assert own.any() and run.contacts.gap[own].min() > -0.01
 
 
 def test_links_that_overlap_at_the_start_never_touch_and_it_is_said_once() -> None:

@@ -8,10 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from iapb.advice.checks import check_scene
-from iapb.effects import decide_effects
 from iapb.errors import ArgumentError, SceneError
-from iapb.mechanics.mechanism import Mechanism
 from iapb.scene import Scene, scene_from_text
 from iapb.scene.mechanism import mechanism_of, start_of
 from iapb.simulation import simulate
@@ -77,12 +74,6 @@ def test_a_finger_rests_on_the_limit_of_its_joint(load: Load) -> None:
     assert not run.distrust
 
 
-def test_effects_name_the_limits_and_the_damping_of_a_robot(load: Load) -> None:
-    effects = {e.name: e for e in decide_effects(load(PALM, FINGER, SLIDE))}
-    assert effects["joint_limits"].active and "r_finger" in effects["joint_limits"].reason
-    assert not effects["joint_damping"].active
-
-
 def test_a_start_at_rest_outside_the_limits_moves_to_the_nearest_one_and_is_said(
     load: Load,
 ) -> None:
@@ -97,12 +88,6 @@ def test_a_start_at_rest_outside_the_limits_moves_to_the_nearest_one_and_is_said
 def test_a_given_start_outside_the_limits_is_refused(load: Load, start: float) -> None:
     said = refusal(load, PALM, FINGER, SLIDE, more=f"position: {{finger: [{start}]}}")
     assert "link finger" in said and "joint slide" in said and "[-0.02, 0.04]" in said
-
-
-@pytest.mark.parametrize("start", [-0.02, 0.01, 0.04])
-def test_a_given_start_within_the_limits_is_kept_without_a_remark(load: Load, start: float) -> None:
-    scene = load(PALM, FINGER, SLIDE, more=f"position: {{finger: [{start}]}}")
-    assert start_of(scene)[0] == start and not any("starts" in said for said in scene.remarks)
 
 
 @pytest.mark.parametrize(
@@ -142,7 +127,6 @@ def test_a_range_of_one_point_is_refused_and_can_be_left_out(load: Load, limit: 
         ('<limit lowr="-1" upper="1"/>', "did you mean lower"),
         ('<limt lower="-1" upper="1"/>', "misspelt"),
         ('<dynamics damping="-1"/>', "dynamics damping"),
-        ('<dynamics friction="-1"/>', "dynamics friction"),
         ('<dynamics dampng="1"/>', "did you mean damping"),
     ],
 )
@@ -270,11 +254,6 @@ def test_one_remark_counts_what_has_no_effect(load: Load) -> None:
     assert scene.with_values({"rate": 500}).remarks == scene.remarks
 
 
-def test_a_plain_robot_is_read_without_a_remark(load: Load) -> None:
-    inside = '<limit lower="-1" upper="1"/><dynamics damping="1"/>'
-    assert load(PALM, FINGER, joint("s", "finger", inside=inside)).remarks == ()
-
-
 # what cannot be simulated is refused, and can be left out
 
 
@@ -302,15 +281,6 @@ def test_damping_and_friction_of_planar_and_floating_joints_are_refused(
 ) -> None:
     move = joint("move", "finger", kind, f'<dynamics {field}="1"/>')
     assert "leave_out: {move: [dynamics]}" in refusal(load, PALM, FINGER, move)
-
-
-def test_left_out_damping_is_none(load: Load) -> None:
-    slide = joint("slide", "finger", inside='<dynamics damping="5"/>')
-    scene = load(PALM, FINGER, slide, more="leave_out: {slide: [dynamics]}")
-    assert scene.bodies[1].joint_damping == ()
-    assert "a joint of it: slide" in refusal(
-        load, PALM, FINGER, slide, more="leave_out: {x: [limit]}"
-    )
 
 
 # a refused robot makes no second mistake
@@ -342,12 +312,6 @@ def test_a_mistake_of_a_robots_body_names_robot_link_and_joint(load: Load) -> No
     assert "bodies[" not in said and "default" not in said
 
 
-def test_a_caution_names_the_body_of_a_robot(load: Load) -> None:
-    turn = joint("turn", "finger", "revolute", '<limit lower="-90" upper="90"/>')
-    said = [str(caution) for caution in check_scene(load(PALM, FINGER, turn))]
-    assert len(said) == 2 and said[0].startswith("bodies.r_finger.joint_limits[0] = -90 rad")
-
-
 # joints that move no mass
 
 YAML = """name: chain
@@ -362,20 +326,12 @@ MOVED = {
         "{name: a, joint: prismatic, axis: [1, 0, 0]}",
         f"{{name: b, parent: a, joint: prismatic, axis: [0, 1, 0], {SOLID}}}",
     ],
-    "a massless universal joint": [
-        "{name: a, joint: revolute, axis: [1, 0, 0]}",
-        f"{{name: b, parent: a, joint: revolute, axis: [0, 1, 0], {SOLID}}}",
-    ],
     "a massless free base": [
         "{name: a, joint: free_flyer}",
         f"{{name: b, parent: a, joint: fixed, origin: [0, 0, 1], {SOLID}}}",
     ],
     "a point on an arm": [
         "{name: a, joint: revolute, axis: [0, 0, 1], mass: 1, center_of_mass: [1, 0, 0]}"
-    ],
-    "a massless plane": [
-        "{name: a, joint: planar}",
-        f"{{name: b, parent: a, joint: revolute, axis: [1, 0, 0], {SOLID}}}",
     ],
 }
 NOT_MOVED = {
@@ -391,11 +347,7 @@ NOT_MOVED = {
         "{name: a, joint: prismatic, axis: [1, 0, 0]}",
         f"{{name: b, parent: a, joint: prismatic, axis: [1, 0, 0], {SOLID}}}",
     ],
-    "tip: no mass turns about it": [
-        "{name: tip, joint: revolute, axis: [1, 0, 0], mass: 1, center_of_mass: [1, 0, 0]}"
-    ],
     "ball: no mass turns about it": ["{name: ball, joint: free_flyer, mass: 1}"],
-    "disc: no mass turns about it": ["{name: disc, joint: planar, mass: 1}"],
 }
 
 
@@ -418,14 +370,6 @@ def test_a_joint_that_moves_no_mass_is_named(said: str, bodies: list[str]) -> No
     assert mistake.line == 5 + len(bodies) and "default" not in mistake.value
 
 
-@pytest.mark.parametrize("use", [simulate, check_scene])
-def test_a_mass_that_is_taken_away_later_is_named_too(use: Callable[[Scene], object]) -> None:
-    bodies = f"  - {{name: arm, joint: revolute, axis: [0, 0, 1], {SOLID}}}\n"
-    scene = scene_from_text(YAML + bodies)
-    with pytest.raises(ArgumentError, match="joint of arm.*no mass turns about it"):
-        use(scene.with_values({"bodies.arm.mass": 0.0, "bodies.arm.inertia": [0.0, 0.0, 0.0]}))
-
-
 def test_a_massless_link_of_a_robot_is_named_with_its_joint(load: Load) -> None:
     said = refusal(load, PALM, link("finger", 0.0), SLIDE)
     assert "link 'finger', joint 'slide'" in said and "no mass moves along it" in said
@@ -437,7 +381,7 @@ def test_a_massless_link_of_a_robot_is_named_with_its_joint(load: Load) -> None:
 # planar joints
 
 
-@pytest.mark.parametrize("axis", ["0 0 1", "1 0 0", "0 2 0", "1 2 -2"])
+@pytest.mark.parametrize("axis", ["0 0 1", "1 2 -2"])
 def test_a_planar_joint_moves_across_its_axis(load: Load, axis: str) -> None:
     slide = joint("move", "finger", "planar").replace('"0 0 1"', f'"{axis}"')
     scene = load(PALM, FINGER, slide, more="position: {finger: [0.3, 0.2, 0.5]}")
@@ -453,16 +397,7 @@ def test_a_planar_joint_moves_across_its_axis(load: Load, axis: str) -> None:
     np.testing.assert_allclose(R[-1], np.eye(3), atol=1e-15)
 
 
-def test_a_planar_joint_has_pinocchios_mass_matrix(load: Load, tmp_path: Path) -> None:
-    pin = pytest.importorskip("pinocchio")
-    load(PALM, FINGER, joint("move", "finger", "planar"))
-    model = pin.buildModelFromUrdf(str(tmp_path / "r.urdf"))
-    mine = Mechanism.from_urdf(tmp_path / "r.urdf")
-    theirs = pin.crba(model, model.createData(), pin.neutral(model))
-    np.testing.assert_allclose(mine.mass_matrix(mine.neutral()), theirs, atol=1e-15)
-
-
-@pytest.mark.parametrize("rpy", [[0.0, 0.0, 0.7], [1.0, 0.5, 0.0]])
+@pytest.mark.parametrize("rpy", [[1.0, 0.5, 0.0]])
 def test_a_turned_planar_base_moves_as_one_that_is_not_turned(rpy: list[float]) -> None:
     """Without gravity: the links that it carries have the same joint angles, and energy stays."""
     bodies = [
