@@ -33,16 +33,6 @@ def test_difference_undoes_integrate(seed, size):
     assert np.abs(error).max() <= 1e-14 * (1.0 + np.abs(q).max()) + 1e-13 * size
 
 
-@given(seeds, st.floats(-3.0, 3.0), st.floats(-3.0, 3.0))
-def test_a_constant_velocity_is_a_one_parameter_group(seed, first, second):
-    rng = np.random.default_rng(seed)
-    mechanism = random_mechanism(rng, 4, moving_kinds)
-    q, v = random_state(rng, mechanism)
-    halfway = mechanism.integrate(mechanism.integrate(q, v, first), v, second)
-    whole = mechanism.integrate(q, v, first + second)
-    assert np.abs(mechanism.difference(halfway, whole)).max() <= 1e-12
-
-
 @pytest.mark.parametrize("kind", ["continuous", "spherical", "free_flyer"])
 def test_the_unit_length_survives_a_million_radians(kind):
     mechanism = alone(kind)

@@ -43,7 +43,6 @@ FOLLOWED = {
     "another branch": (None, None, None, Mimic("c", 3.0, 0.1)),
     "a later joint": (Mimic("d", 0.7), None, None, None),
     "prismatic leader": (Mimic("b", 2.0, -0.3), None, Mimic("b", -1.0), Mimic("b")),
-    "multiplier zero": (None, None, Mimic("a", 0.0, 0.4), None),
 }
 
 
@@ -87,20 +86,6 @@ def test_a_urdf_is_read_as_pinocchio_reads_it_with_mimic(tmp_path: Path) -> None
     # what is timed is Pinocchio's own model, which includes gravity
     mass, _ = calls_from_urdf(path)
     np.testing.assert_allclose(mass(q), mechanism.mass_matrix(q), rtol=AGREEMENT)
-
-
-def test_energy_of_free_motion_stays_where_joints_follow() -> None:
-    """The kernels' B and M belong together: v·(dM/dt v)/2 = v·B of a scene without forces."""
-    mechanism = tree(*FOLLOWED["along a chain"])
-    rng = np.random.default_rng(1)
-    h = 1e-6
-    q = mechanism.integrate(mechanism.neutral(), rng.normal(size=mechanism.nv))
-    v = rng.normal(size=mechanism.nv)
-    rate = (
-        mechanism.mass_matrix(mechanism.integrate(q, v, h))
-        - mechanism.mass_matrix(mechanism.integrate(q, v, -h))
-    ) / (2.0 * h)
-    assert 0.5 * v @ rate @ v == pytest.approx(v @ mechanism.bias(q, v), rel=1e-6)
 
 
 def test_limits_of_what_follows_bound_the_leader() -> None:

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from iapb.errors import ArgumentError
 from iapb.mechanics.mechanism import Mechanism
 from iapb.mechanics.urdf import read_urdf
-from iapb.scene import load_scene, scene_folder, scene_from_text
+from iapb.scene import load_scene, scene_folder
 from iapb.simulation import simulate
 
 INERTIAL = """<inertial><origin xyz="0.1 0 0" rpy="0 0 1.5707963267948966"/><mass value="2"/>
@@ -86,7 +86,6 @@ def test_a_chain_of_thousands_of_links_is_read(read):
 BASE = link("base")
 ARM = link("arm")
 MISTAKES = {
-    "unknown type": ([BASE, ARM, joint("elbow", "base", "arm", "hinge")], "elbow.*type"),
     "no such link": ([BASE, joint("elbow", "base", "hand")], "elbow.*child"),
     "two parents": (
         [BASE, ARM, joint("a", "base", "arm"), joint("b", "base", "arm")],
@@ -96,32 +95,20 @@ MISTAKES = {
         [BASE, ARM, joint("elbow", "base", "arm", inside='<axis xyz="0 0 0"/>')],
         "elbow.*axis",
     ),
-    "two numbers": (
-        [BASE, ARM, joint("elbow", "base", "arm", inside='<axis xyz="0 1"/>')],
-        "elbow.*axis",
-    ),
     "not a number": (
         [BASE, ARM, joint("j", "base", "arm", inside='<origin rpy="0 0 pi"/>')],
         "'j'.*origin rpy",
     ),
-    "infinite": (
-        [BASE, ARM, joint("j", "base", "arm", inside='<origin xyz="0 0 inf"/>')],
-        "'j'.*origin xyz",
-    ),
     "negative mass": ([link("base", INERTIAL.replace('value="2"', 'value="-2"'))], "base.*mass"),
     "no mass": ([link("base", "<inertial><origin/></inertial>")], "base.*inertial"),
-    "no izz": ([link("base", INERTIAL.replace("izz", "i_zz"))], "base.*izz"),
     "name twice": ([BASE, BASE], "base"),
-    "inertial twice": ([link("base", "<inertial/><inertial/>")], "twice"),
     "wrong attribute": ([link("base", INERTIAL.replace("xyz", "xzy"))], "xzy"),
     "no name": (["<link/>"], "name"),
     "no child": (
         [BASE, '<joint name="j" type="fixed"><parent link="base"/></joint>'],
         "'j'.*child",
     ),
-    "two roots": ([BASE, ARM], "base.*arm"),
     "nothing": ([], "root"),
-    "ring": ([BASE, ARM, link("c"), joint("a", "arm", "c"), joint("b", "c", "arm")], "form a loop"),
 }
 
 
@@ -129,11 +116,6 @@ MISTAKES = {
 def test_mistakes_name_the_element(read, elements, named):
     with pytest.raises(ArgumentError, match=named):
         read(*elements)
-
-
-def test_what_others_add_is_let_through(read):
-    added = "<gazebo/>", link("a", "<contact/><visual/>"), "<transmission name='t'/>"
-    assert len(read(*added).names) == 1
 
 
 @pytest.mark.parametrize(
@@ -197,14 +179,6 @@ def write(folder: Path, arm: str = "", lines: str = "floating: false") -> Path:
     (folder / "r.urdf").write_text(ARM_WITH_SHAPES.format(arm=arm, base=""))
     (folder / "scene.yaml").write_text(SCENE.format(lines=lines))
     return folder / "scene.yaml"
-
-
-def test_collision_elements_are_ignored_and_the_scene_gives_the_shapes(tmp_path: Path) -> None:
-    elements = '<collision><geometry><sphere radius="0.05"/></geometry></collision><collision><cone/></collision>'
-    assert load_scene(write(tmp_path, elements)).bodies[1].shapes == ()
-    scene = load_scene(write(tmp_path, elements, "shapes: {arm: [{kind: sphere, radius: 0.1}]}"))
-    assert [[shape.kind for shape in body.shapes] for body in scene.bodies] == [[], ["sphere"]]
-    assert scene_from_text(scene.source_text).resolved() == scene.resolved()
 
 
 def test_the_ball_at_the_end_of_the_arm_meets_the_floor(tmp_path: Path) -> None:
