@@ -67,14 +67,11 @@ CHOSEN: list[tuple[str, Scene, tuple[Any, ...], bool, str, str]] = [
         for law, on in (("penalty", True), (RIGID, False))
     ),
     ("friction", PEG.with_values({"contact.friction": 0.0}), (RIGID,), False, RIGID.name, ""),
-    ("friction", HALF_SMOOTH, (), True, "friction 0 to 0.3", ""),
-    ("impact_friction", HALF_SMOOTH, (RUBBING,), True, "friction 0 to 0.3", ""),
     *(
         (name, JOINTED, (DRIFTING,), False, "'drifting' does not use it", name)
         for name in ("joint_damping", "joint_limits")
     ),
     ("impact_friction", ROUGH, (RUBBING,), True, "0.3", ""),
-    ("impact_friction", ROUGH, ("impulse-augmented penalty",), False, "does not use it", ""),
     ("impact_friction", PER_BODY, (RUBBING,), False, "per_body", ""),
     *(
         (name, PEG, (None, "none"), False, "no coupling", "")
@@ -100,22 +97,6 @@ CHOSEN: list[tuple[str, Scene, tuple[Any, ...], bool, str, str]] = [
     ("coupling", BARE, (None, GAINS), True, "[5, 6, 7]", ""),
     ("device_limits", PEG, (None, "four-channel", "full"), False, "'full'", ""),
     ("device_limits", PEG, (None, "four-channel", "scale"), True, "'scale'", ""),
-    (
-        "device_limits",
-        PEG,
-        (None, "none", "scale"),
-        True,
-        "[15, 15, 1]",
-        "",
-    ),  # the tool's impulse is scaled as well
-    (
-        "gravity",
-        PENDULUM.with_values({f"bodies.{link}.mass": 0 for link in ("upper", "lower")}),
-        (),
-        False,
-        "mass",
-        "",
-    ),
     (
         "gravity",
         PENDULUM.with_values({"bodies": SLIDER}),

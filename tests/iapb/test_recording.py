@@ -137,15 +137,3 @@ def test_a_resting_contact_that_was_left_unsolved_is_remarked():
     recorder.chunk(5)
     simulation.state.rest_work.shortened[0] = 1
     assert UNSOLVED in recorder.run("", "").remarks
-
-
-def test_time_names_and_the_rendered_force_fit_the_arrays():
-    scene = load_scene(find_scene("arm_pushing"))
-    run = simulate(scene, coupling=coupling_of(scene, "four-channel"), steps=STEPS)
-    assert run.time == pytest.approx(np.arange(STEPS + 1) / scene.rate, rel=1e-15)
-    assert len(run.coordinate_names) == len(run.coordinate_units) == run.q.shape[1]
-    assert run.device_q.shape == (STEPS + 1, 2) and run.device_force.shape == (STEPS, 2)
-    assert run.scene_source == scene.source_text and run.scene_resolved == scene.resolved()
-    assert run.world == f"{run.law} + {run.coupling}" and run.coupling == "four-channel"
-    rendered = run.penalty_force + run.friction_force + run.impulse / run.dt  # (26)
-    assert run.environment_force == pytest.approx(rendered, rel=1e-14, abs=1e-14)

@@ -28,12 +28,9 @@ PEG = load_scene(find_scene("peg_corner"))
 @pytest.mark.parametrize(
     ("peg", "floor", "general", "expected"),
     [
-        (0.5, 0.5, 0.0, 0.5),
         (0.2, 0.8, 0.3, 0.4),
         (0.25, None, 0.7, 0.25),
-        (None, 0.25, 0.7, 0.25),
         (0.0, 0.9, 0.5, 0.0),
-        (None, None, 0.3, 0.3),
     ],
 )
 def test_of_two_values_the_geometric_mean_counts(
@@ -189,8 +186,6 @@ def beyond(run: Run) -> float:
     "law",
     [
         ImpulseAugmented(),
-        ImpulseAugmented(pushing=True),
-        ImpulseAugmented(friction_in_impacts=True),
         Penalty(),
     ],
 )

@@ -22,7 +22,7 @@ from iapb.numerics.schema import quantities
 from iapb.run import FREE, Run
 from iapb.scene import find_scene, load_scene, scene_from_text
 from iapb.simulation import Simulation, simulate
-from iapb.system import coupling_of, system_of
+from iapb.system import coupling_of
 from tests.iapb.test_recording import assert_same, results_of
 from tests.iapb.test_simulation_stops import Wrapped
 
@@ -117,15 +117,6 @@ def test_a_subclass_with_a_step_of_its_own_is_not_run_as_the_engines_law():
     assert run.kernel == "python" and np.array_equal(run.q, np.tile(run.q[0], (4, 1)))
 
 
-def test_results_of_steps_stay_as_they_were():
-    simulation = Simulation(PEG)
-    first = simulation.step()
-    before = [values.copy() for values in first[:5]]
-    for _ in range(200):
-        simulation.step()
-    assert all(np.array_equal(kept, values) for kept, values in zip(before, first[:5], strict=True))
-
-
 def test_the_hand_force_stays_until_the_next_one():
     simulation = Simulation(
         PEG.with_values({"hand.force": [0, 0, 0], "bodies.peg.position": [1, -1, 0.0]})
@@ -147,18 +138,10 @@ def test_the_hand_force_stays_until_the_next_one():
     [
         [1.0],
         [1.0, 2.0, float("nan")],
-        np.zeros((3, 1)),
-        [np.inf] * 6,
         "abc",
-        ["1", "2", "3"],
         [True, False, True],
-        [1j, 0, 0],
-        [10**400, 0, 0],
         {"x": 1.0},
-        (x for x in (1.0, 2.0, 3.0)),
-        np.ma.masked_array(np.zeros(3)),
         [[1], [2, 3]],
-        np.zeros(3, "m8[s]"),
     ],
 )
 def test_a_wrong_hand_force_is_named(force):
@@ -316,29 +299,6 @@ def test_what_follows_from_a_run_is_its_own_and_computed_when_it_is_asked_for() 
         assert each.scene_source == heavy.source_text and each.distrust == distrust_of(last)
     with pytest.raises(AttributeError, match="no attribute 'poses'"):
         last.poses  # noqa: B018
-
-
-def test_simulations_share_nothing_that_changes() -> None:
-    """Of one scene, and of two that differ in a value: what one writes no other sees, and what both
-    read stays."""
-    alike = ARM.with_values({"contact.friction": 0.25})
-    coupling = coupling_of(ARM, "four-channel")
-    moving, *others = (Simulation(system_of(each), coupling=coupling) for each in (ARM, ARM, alike))
-    constant = {id(array) for each in (moving, *others) for array in each.port.mechanism.arrays()}
-    changing = {each: [*each.state.arrays(), *each.port.arrays()] for each in (moving, *others)}
-    arrays = [array for each in changing.values() for array in each if id(array) not in constant]
-    assert not any(np.shares_memory(*two) for two in itertools.combinations(arrays, 2))
-
-    def seen() -> list[bytes]:
-        read = [each.world.arrays() + each.system.mechanism.block.arrays() for each in others]
-        return [
-            array.tobytes()
-            for array in itertools.chain(*read, *(changing[each] for each in others))
-        ]
-
-    before = seen()
-    assert recording.Recorder(moving).chunk(moving.scene.steps) is None
-    assert moving.state.q.tobytes() != others[0].state.q.tobytes() and seen() == before
 
 
 def test_a_changed_file_is_read_again(tmp_path: Path) -> None:

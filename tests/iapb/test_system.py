@@ -7,7 +7,7 @@ import pytest
 
 from iapb.contact.laws import ImpulseAugmented
 from iapb.errors import ArgumentError
-from iapb.haptics.coupling import FourChannel, NoCoupling
+from iapb.haptics.coupling import FourChannel
 from iapb.scene import find_scene, load_scene
 from iapb.system import System, coupling_of
 
@@ -35,22 +35,6 @@ def test_limits_are_those_of_the_tools_coordinates_alone():
     assert limit.tolist() == [5.0, 5.0, np.inf, np.inf, np.inf]
 
 
-def test_couplings_come_from_the_scene_and_their_absence_is_said():
-    assert coupling_of(PEG, "four-channel").settings["stiffness"] == [100.0, 100.0, 0.5]
-    assert coupling_of(PEG, "none") == NoCoupling()
-    with pytest.raises(
-        ArgumentError, match="coupling = 'spring': expected one of none, four-channel, unilateral"
-    ):
-        coupling_of(PEG, "spring")
-    with pytest.raises(ArgumentError, match="two_discs gives no gains"):
-        coupling_of(load_scene(find_scene("two_discs")), "unilateral")
-
-
 def test_a_device_needs_a_hand():
     with pytest.raises(ArgumentError, match="has no hand, so no device"):
         System(load_scene(find_scene("two_discs"))).make_port(FourChannel((1.0,), (1.0,)))
-
-
-def test_a_margin_that_is_no_number_is_refused() -> None:
-    with pytest.raises(ArgumentError, match="margin"):
-        System(PEG).contacts_at([0.0, 5.0, 0.1], np.nan)

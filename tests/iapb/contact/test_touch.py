@@ -13,7 +13,7 @@ from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling
 from iapb.run import Run
 from iapb.scene import Scene, scene_from_text
 from iapb.scene.reading import scene_from_values
-from iapb.simulation import Simulation, simulate
+from iapb.simulation import simulate
 from verification.certificate import certify
 from verification.ordinary.touch import INERTIA, G, heights, toss_values, tossed
 
@@ -131,15 +131,6 @@ def test_impacts_say_when_and_where_they_happen() -> None:
     np.testing.assert_allclose(run.impacts.q[:, 1], 0.1, atol=1e-12)
     np.testing.assert_allclose(run.impacts.v_minus[:, 1], -G * fall)
     assert certify(run).passed
-
-
-def test_single_steps_give_the_bits_of_one_run() -> None:
-    scene = toss_scene(states(1, seed=5)[0], 500.0)
-    run = simulate(scene)
-    simulation = Simulation(scene)
-    for k in range(run.steps):
-        result = simulation.step()
-        assert (result.q == run.q[k + 1]).all() and (result.v == run.v[k + 1]).all()
 
 
 def plate(speed: float, more: str = "") -> Run:

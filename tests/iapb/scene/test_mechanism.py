@@ -13,7 +13,6 @@ from iapb.errors import SceneError
 from iapb.mechanics.mechanism import Mechanism
 from iapb.scene import Scene, load_scene, scene_from_text
 from iapb.scene.mechanism import mechanism_of, pairs_and_remarks, pairs_of, shapes_of, start_of
-from iapb.system import System
 
 # A bracket on the world carries a chain of three links, the last with a welded tool; two pucks lie
 # free.
@@ -62,12 +61,6 @@ def test_prismatic_axis_lies_in_the_plane_and_has_length_one() -> None:
     step[-1] = 0.25
     moved = mechanism.placements(mechanism.integrate(q, step, 1.0))[1] - mechanism.placements(q)[1]
     np.testing.assert_allclose(moved[-1], [0.0, 0.25, 0.0], atol=1e-15)
-
-
-def test_the_arm_of_a_stop_is_the_radius_of_gyration_of_all_that_its_joint_carries() -> None:
-    """Three links of 1 kg m² about one axis, the first of 1 kg and the last of 2 kg."""
-    given = {"bodies.one.mass": 1, "bodies.three.mass": 2, "bodies.one.joint_limits": [-1, 1]}
-    assert System(CHAIN.with_values(given)).stops.arm == pytest.approx(1.0)
 
 
 def test_shapes_of_a_body_that_nothing_moves_are_static_and_in_world_axes() -> None:
@@ -180,10 +173,3 @@ def test_urdf_paths_stay_in_the_scene_folder(tmp_path: Path, urdf: str) -> None:
     assert "inside the scene's folder" in mistakes_of(
         scene_with_robot(folder, urdf), str(folder / "scene.yaml")
     )
-
-
-def test_unknown_links_and_bad_files_are_mistakes_of_the_scene(tmp_path: Path) -> None:
-    file = str(tmp_path / "scene.yaml")
-    text = scene_with_robot(tmp_path, more=", position: {leg: [1]}")
-    assert "robots[0].position of robot rob = 'leg'" in mistakes_of(text, file)
-    assert "readable" in mistakes_of(scene_with_robot(tmp_path, "missing.urdf"), file)

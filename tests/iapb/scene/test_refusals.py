@@ -157,26 +157,16 @@ def test_unknown_fields_are_refused_everywhere(part: str) -> None:
     assert caught.value.mistakes[0].path.endswith(".masss")
 
 
-def test_bodies_of_one_tree_stand_together() -> None:
-    plain = FULL.resolved()
-    plain["bodies"] = [plain["bodies"][i] for i in (0, 1, 3, 2)]
-    with pytest.raises(ValueError, match="base's tree"):
-        Scene.model_validate(plain)
-
-
 @pytest.mark.parametrize(
     ("text", "line", "word"),
     [
         ("name: [1, 2\nrate: 3\n", 2, "YAML"),
-        ("name: 'open\n", 2, "YAML"),
         ("\tname: x\n", 1, "YAML"),
-        ("name: \x00\n", 1, "YAML"),
         ('name: "\\UFFFFFFFF"\n', 1, "YAML"),
         ("name: !!python/object/apply:os.getcwd []\n", 1, "tags"),
         ("a: 1\n---\nb: 2\n", 2, "document"),
         ("a: *b\n", 1, "alias"),
         ("a: &x [1, *x]\n", 1, "levels"),
-        ("? [1, 2]\n: 3\n", 1, "name of a field"),
         ("a: " + "[" * 100 + "]" * 100, 1, "levels"),
         ("a: " + "[" * 5_000, 1, "YAML"),
         (
@@ -213,7 +203,12 @@ def test_files_that_cannot_be_read_say_why(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "name",
-    [None, 3, b"peg_corner", {}, "a\0b", "a" * 5000, "a/" + "b" * 5000, "a" * 5000 + ".yaml"],
+    [
+        None,
+        b"peg_corner",
+        "a\0b",
+        "a/" + "b" * 5000,
+    ],
     ids=lambda name: repr(name)[:9],
 )
 def test_what_cannot_be_a_scene_is_named(name: Any) -> None:
@@ -221,9 +216,7 @@ def test_what_cannot_be_a_scene_is_named(name: Any) -> None:
         find_scene(name)
 
 
-@pytest.mark.parametrize(
-    "path", ["bodies.peg_2.mass", "contact.friction.x", "walls.7.point", "bodies..mass", "", 3]
-)
+@pytest.mark.parametrize("path", ["bodies.peg_2.mass", "contact.friction.x", "", 3])
 def test_paths_that_lead_nowhere_are_named(path: Any) -> None:
     with pytest.raises(ArgumentError) as caught:
         FULL.with_values({path: 1})
@@ -234,12 +227,10 @@ def test_paths_that_lead_nowhere_are_named(path: Any) -> None:
     "values",
     [
         None,
-        [("duration", 1)],
-        "duration",
         {"hand.force": (x for x in (1, 2, 3))},
         {"gravity": {0.0, 9.0}},
     ],
-    ids=["none", "pairs", "text", "generator", "set"],
+    ids=["none", "generator", "set"],
 )
 def test_new_values_of_a_wrong_kind_are_named(values: Any) -> None:
     with pytest.raises(ArgumentError, match="^values = "):

@@ -27,23 +27,6 @@ def test_every_scene_loads_under_its_file_name_and_starts_without_deep_overlap(n
     assert np.linalg.eigvalsh(mechanism_of(scene).mass_matrix(q)).min() > 0.0
 
 
-@pytest.mark.parametrize(
-    ("name", "height", "along"), [("two_link_arm_a", 1.7, 0.7), ("two_link_arm_b", 1.5, 0.5)]
-)
-def test_arm_touches_the_obstacle_across_the_rod_at_the_named_place(
-    name: str, height: float, along: float
-) -> None:
-    scene = load_scene(find_scene(name))
-    mechanism = mechanism_of(scene)
-    q, v = start_of(scene)
-    ((point, normal, gap),) = contacts_at(scene, q)
-    assert gap == pytest.approx(-1e-9, abs=1e-13)
-    np.testing.assert_allclose(normal, [1.0, 0.0, 0.0], atol=1e-12)
-    row = normal @ mechanism.point_jacobian(q, mechanism.index("forearm"), point)
-    np.testing.assert_allclose(row, [-height, -along], atol=1e-9)
-    assert mechanism.kinetic_energy(q, v) == pytest.approx(7.0 / 3.0, rel=1e-14)
-
-
 @pytest.mark.parametrize("depth", [1e-6, 1e-5, 7e-5])
 def test_peg_meets_the_tight_hole_at_six_points_in_the_same_instant(depth: float) -> None:
     """Six contacts approach at once wherever in the step the peg arrives; their rows have rank
@@ -77,20 +60,3 @@ def test_peg_ends_in_the_hole_and_normals_are_unit_and_finite(peg: Run) -> None:
     assert np.abs(peg.q[-1, :2]).max() < 1e-3
     np.testing.assert_allclose(np.linalg.norm(peg.contacts.normal, axis=1), 1.0, atol=1e-12)
     assert peg.contacts.gap.min() > -4e-3
-
-
-def test_links_of_the_arm_meet_obstacles_and_the_block() -> None:
-    run = simulate(load_scene(find_scene("arm_obstacles")))
-    names = np.array([*run.body_names, "world"])
-    met = {
-        frozenset((names[a], names[b]))
-        for a, b in zip(run.contacts.body_a, run.contacts.body_b, strict=True)
-    }
-    arm = {name for name in run.body_names if name.startswith("arm_")}
-    assert any("world" in pair and pair & arm for pair in met)
-    assert any("block" in pair and pair & arm for pair in met)
-    assert (
-        len(run.impacts.step) > 0
-        and run.impacts.energy_lost.min() > -1e-12
-        and np.isfinite(run.q).all()
-    )
