@@ -12,30 +12,11 @@ import pytest
 from scipy import sparse
 
 from iapb.errors import ArgumentError
-from reference.complementarity import ImpactProblem, Solution
 from reference.datasets import WITH_MECHANICS, DatasetError, problem_files, read_problem
 from tests.reference.fclib_files import local_file
 
 PROBLEMS = Path(__file__).parents[3] / "shared" / "problems"
 shared = pytest.mark.skipif(not PROBLEMS.exists(), reason="shared problem files are not here")
-
-# Known solutions from the sources that the files name.
-KNOWN = {
-    "lcp_CPS_2.dat": [0.0, 1.0, 3.0],
-    "lcp_deudeu.dat": [4.0 / 3.0, 7.0 / 3.0],
-    "lcp_Pang_isolated_sol.dat": [1.0, 0.0, 0.0],
-}
-
-
-@shared
-@pytest.mark.parametrize("name", KNOWN)
-def test_siconos_files_are_read_by_columns(name: str) -> None:
-    """The solution of the book solves the matrix read by columns, and not its transpose."""
-    problem = read_problem(PROBLEMS / "lcp" / name).problem
-    solution = np.array(KNOWN[name])
-    assert Solution(problem, solution).solved(1e-14)
-    transposed = ImpactProblem.from_delassus(problem.delassus.T, problem.gamma_minus)
-    assert problem.asymmetry == 0.0 or not Solution(transposed, solution).solved(1e-3)
 
 
 def test_a_siconos_file_lists_columns(tmp_path: Path) -> None:
@@ -87,18 +68,13 @@ def test_a_local_problem_is_read_as_its_file_says(tmp_path: Path) -> None:
     [
         ("cut.lcp", b"2 1 0 0 1 -1", "with 5 numbers, expected"),
         ("words.lcp", b"2 1 0 zero 1 -1 -1", "could not convert"),
-        ("nan.lcp", b"1 nan -1", "finite numbers"),
         ("size.lcp", b"2.5 1", "2.5"),
-        ("huge.lcp", b"1e9 1", "1e9"),
         ("empty.lcp", b"", "cannot be read"),
         ("torn.lcp.gz", gzip.compress(b"1 1 -1", mtime=0)[:-6], "cannot be read"),
         ("binary.lcp", b"\xff\xfe\x00", "utf-8"),
         ("sparse.dat", b"2 1 2 2 2 2 1 1", "storage flag 1"),
-        ("sizes.dat", b"2 0 3 3 3 3 1 1", "four times 2"),
-        ("head.dat", b"2 0", "expected flag 0"),
         ("foreign.hdf5", b"not hdf5 at all", "cannot be read"),
         ("picture.png", b"", "unknown kind"),
-        ("mixed.txt", b"", "unknown kind"),
     ],
 )
 def test_damaged_and_foreign_files_are_named(
@@ -162,12 +138,10 @@ def test_a_global_problem_is_condensed_whatever_its_number_of_coordinates(
     [
         ("fclib_local/W/p", np.array([0, *[10**9] * 5, 0], np.int32), "pointers p decrease"),
         ("fclib_local/W/i", np.array([99, 0], np.int32), "indices"),
-        ("fclib_local/vectors/mu", None, "cannot be read"),
         ("fclib_local/W/nz", np.array([77]), "nz = 77"),
         ("fclib_local/spacedim", np.array([5]), "2 or 3"),
         ("fclib_local/W/m", np.array([10**6]), "at most"),
         ("fclib_local/vectors/q", np.array([np.nan]), "finite numbers"),
-        ("fclib_local/vectors/q", np.bytes_("q"), "numbers"),
     ],
 )
 def test_a_damaged_fclib_file_is_named(tmp_path: Path, name: str, value: Any, says: str) -> None:

@@ -3,7 +3,6 @@ them."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,8 +11,6 @@ import pytest
 from iapb.errors import ArgumentError, SolverError
 from iapb.scene import Scene, find_scene, load_scene, scene_from_text
 from iapb.simulation import simulate
-from reference.complementarity import ImpactProblem
-from reference.complementarity.laws import Outcome, poisson
 from reference.event_driven import LinearSystem, event_driven
 from reference.scene_events import scene_truth
 from reference.worlds import run_world
@@ -75,17 +72,6 @@ def test_a_resting_contact_opens_when_the_force_lifts_it_and_equal_elastic_balls
     assert event_driven(lifted, [0.0], [0.0], 2.0).state([2.0])[0][0, 0] == pytest.approx(2.0)
     exact = event_driven(row_of_balls([1.0, 1.0, 1.0], 1.0), [0.0, 1.0, 2.5], [1.0, 0.0, 0.0], 10.0)
     assert exact.v[-1] == pytest.approx([0.0, 0.0, 1.0], abs=1e-14)
-
-
-def test_the_law_of_the_impacts_is_the_callers() -> None:
-    def plastic(problem: ImpactProblem) -> Outcome:
-        return poisson(replace(problem, restitution=np.zeros(problem.contacts)))
-
-    system = row_of_balls([1.0, 1.0], 1.0)
-    assert event_driven(system, [0.0, 1.0], [1.0, 0.0], 3.0).v[-1] == pytest.approx([0.0, 1.0])
-    assert event_driven(system, [0.0, 1.0], [1.0, 0.0], 3.0, law=plastic).v[-1] == pytest.approx(
-        [0.5, 0.5]
-    )
 
 
 DROP = scene_of(

@@ -57,7 +57,7 @@ def axes_of(quaternions: Floats) -> Floats:
 # --- torque-free motion
 # ------------------------------------------------------------------------------------------
 @both
-@pytest.mark.parametrize(("spin", "duration"), [(10.0, 2.0), (100.0, 0.5), (1000.0, 0.02)])
+@pytest.mark.parametrize(("spin", "duration"), [(10.0, 0.5), (1000.0, 0.02)])
 def test_an_asymmetric_top_turns_as_elliptic_functions_say(
     moved: Moved, spin: float, duration: float
 ) -> None:
@@ -99,8 +99,8 @@ def test_a_spinning_sphere_flies_straight(moved: Moved, spin: float) -> None:
 
 
 def test_floating_trees_that_turn_keep_momentum_and_energy() -> None:
-    """Random trees on a free flyer, in free motion for 0.3 s at up to 30 rad/s."""
-    for seed in range(3):
+    """Random trees on a free flyer, in free motion for 0.1 s at up to 30 rad/s."""
+    for seed in range(2):
         rng = np.random.default_rng(seed)
         tree = random_mechanism(rng, 3, ("revolute", "spherical")).bodies
         base = Body(
@@ -113,7 +113,7 @@ def test_floating_trees_that_turn_keep_momentum_and_energy() -> None:
         v = rng.uniform(-30.0, 30.0, mechanics.nv)
         energy = mechanics.kinetic_energy(q, v)
         momentum = mechanics.centroidal_momentum(q, v)
-        for _ in range(300):
+        for _ in range(100):
             q, v = free_motion(mechanics, q, v, 1e-3)
         assert mechanics.kinetic_energy(q, v) == pytest.approx(energy, rel=1e-10)
         assert mechanics.centroidal_momentum(q, v) == pytest.approx(
@@ -152,7 +152,7 @@ def test_a_heavy_symmetric_top_precesses_steadily(moved: Moved) -> None:
         "velocity": turning,
         "position": [np.sin(TILT / 2), 0.0, 0.0, np.cos(TILT / 2)],
     }
-    time, q, v = moved(scene_of(top, gravity=G), 1.0)
+    time, q, v = moved(scene_of(top, gravity=G), 0.5)
     axes = axes_of(q)
     upward = np.einsum("nij,nj->ni", axes, np.array([pivot, pivot, C]) * v)[:, 2]
     assert upward == pytest.approx(upward[0], rel=1e-9) and v[:, 2] == pytest.approx(spin, rel=1e-9)
@@ -173,9 +173,7 @@ BALL: dict[str, Any] = {
 }
 
 
-@pytest.mark.parametrize(
-    ("turning", "share"), [(2.0 / RADIUS, 1.0), (0.0, 5.0 / 7.0), (-2.0 / RADIUS, 3.0 / 7.0)]
-)
+@pytest.mark.parametrize(("turning", "share"), [(2.0 / RADIUS, 1.0), (-2.0 / RADIUS, 3.0 / 7.0)])
 def test_a_billiard_ball_ends_rolling(turning: float, share: float) -> None:
     """At 2 m/s, rolling, sliding, with back spin: v = (5 v₀ + 2 ω₀ r)/7 and x = v t + (v₀ − v)²/(2
     μ g).
@@ -200,14 +198,14 @@ def test_a_billiard_ball_ends_rolling(turning: float, share: float) -> None:
     assert np.linalg.norm(run.v[-1, 3:]) * RADIUS == pytest.approx(2.0 * share, rel=1e-9)
 
 
-@pytest.mark.parametrize("spin", [10.0, 1000.0])
-def test_an_eccentric_disc_that_turns_fast_stays_on_the_floor(spin: float) -> None:
+def test_an_eccentric_disc_that_turns_fast_stays_on_the_floor() -> None:
     """No friction: (I + m c² cos² θ) θ'²/2 − m g c sin θ is constant, and the height is r − c sin
     θ.
 
     Gravity holds it down against c θ'². The truth keeps the contact by an acceleration, J̇v, found
     by differences.
     """
+    spin = 1000.0
     mass = 1.0
     inertia = 2e-3
     radius = 0.05

@@ -20,20 +20,13 @@ pytest.importorskip("mujoco")
 
 # name -> how far the error may be above the case's tolerance: MuJoCo's contact is soft
 RIGHT = {
-    "ball_starts_to_roll": 1.0,
     "box_slides_and_stops": 1.0,
     "box_slides_down_slope": 1.0,
-    "box_stays_on_slope": 1.0,
     "tower_5_in_space": 1.0,
     "double_pendulum": 1.0,
-    "floating_robot": 1.0,
-    "spherical_pendulum": 1.0,
-    "bounce_100_percent": 1.0,
     "bounce_50_percent": 3.0,
     "hand_holds_arm": 1.0,
-    "pushed_by_a_function": 1.0,
     "ladder_slips": 1.0,
-    "arch": 1.0,
 }
 GROUND = {"name": "floor", "kind": "half_space", "point": [0, 0, 0], "normal": [0, 0, 1]}
 
@@ -68,7 +61,7 @@ def test_ordinary_scenes_have_their_known_outcome(name: str) -> None:
     assert case.error(motion_of(run)) <= RIGHT[name] * case.tolerance
 
 
-@pytest.mark.parametrize("restitution", [0.3, 0.5, 0.8, 1.0])
+@pytest.mark.parametrize("restitution", [0.5, 1.0])
 def test_a_ball_bounces_with_the_share_of_its_speed(restitution: float) -> None:
     run = simulate(ball(restitution), world="mujoco")
     speed = run.v[:, 2]

@@ -12,17 +12,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iapb.contact.finding import Contacts
-from iapb.errors import ArgumentError, IapbError, SolverError
-from iapb.mechanics.mechanism import Body, Joint, Mechanism
+from iapb.errors import ArgumentError, SolverError
 from iapb.run import COLLIDING, FREE, RESTING
 from iapb.scene import Scene, find_scene, load_scene
-from iapb.simulation import INTERRUPTED, simulate
+from iapb.simulation import simulate
 from iapb.system import System
 from reference import rigid_step as stepping
 from reference import time_stepping
-from reference.contact_rows import contact_jacobian, find_rows, mechanics_of
-from reference.rigid_body import model_of
+from reference.contact_rows import mechanics_of
 from reference.rigid_step import (
     NEWTON,
     POISSON,
@@ -32,7 +29,7 @@ from reference.rigid_step import (
     velocity_bounds,
 )
 from reference.time_stepping import RigidConstraints
-from reference.worlds import WORLDS, find_world, require_complete, run_world
+from reference.worlds import WORLDS, find_world, run_world
 from tests.reference.scenes import scene_of
 
 DT = 1.0 / 512
@@ -113,16 +110,6 @@ def test_a_resting_contact_under_load_does_not_hop() -> None:
     )  # the load closes it
 
 
-def test_an_open_contact_may_not_pass_where_its_own_restitution_is_zero() -> None:
-    gap = np.array([1e-4, 1e-4])
-    v = np.array([-1.0, -1.0])
-    found = step(np.eye(2), v, np.zeros(2), np.eye(2), gap, np.array([0.0, 0.5]))
-    assert (
-        gap[0] + DT * found.velocity[0] == pytest.approx(0.0, abs=1e-18)
-        and found.velocity[1] == -1.0
-    )
-
-
 def test_a_wrong_multiplier_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("daqp", "quadprog", "gauss_seidel"):
         assert step([[2.0]], [-1.0], [0.0], [[1.0]], [0.0], 0.0).velocity[0] == pytest.approx(
@@ -148,9 +135,7 @@ def test_velocities_that_cancel_are_judged_by_their_rounding() -> None:
 @pytest.mark.parametrize(
     ("call", "given_"),
     [
-        (velocity_bounds, {"restitution": np.array([0.5])}),
         (velocity_bounds, {"restitution": np.array([0.5, 1.5])}),
-        (velocity_bounds, {"restitution": -0.1}),
         (velocity_bounds, {"stabilization": 2.0, "restitution": 0.0}),
         (velocity_bounds, {"scheme": "euler", "restitution": 0.0}),
         (RigidConstraints, {"scheme": "euler"}),
@@ -165,17 +150,12 @@ def test_settings_out_of_range_are_refused(call: Any, given_: dict[str, Any]) ->
 
 # --- restitution: one e for all contacts, or one for each
 # -----------------------------------------------------------
-@pytest.mark.parametrize("e", [(1.0, 0.0), (0.3, 0.8), (0.5, 0.5)])
+@pytest.mark.parametrize("e", [(1.0, 0.0), (0.3, 0.8)])
 def test_each_contact_returns_its_own_share(e: tuple[float, float]) -> None:
-    """A bar falls flat on its two ends: J v⁺ = −E J v⁻ at both, by Newton's law; equal e is the
-    scalar's step."""
+    """A bar falls flat on its two ends: J v⁺ = −E J v⁻ at both, by Newton's law."""
     found = step(BAR, [-1.0, 0.0], [0.0, 0.0], ENDS, [0.0, 0.0], np.array(e))
     assert found.restitution_law == NEWTON
     assert ENDS @ found.velocity == pytest.approx(e, abs=1e-14)
-    if e[0] == e[1]:
-        assert np.array_equal(
-            found.velocity, step(BAR, [-1.0, 0.0], [0.0, 0.0], ENDS, [0.0, 0.0], e[0]).velocity
-        )
 
 
 def test_a_load_at_rest_is_not_thrown_by_rounding() -> None:
@@ -200,37 +180,6 @@ def test_steps_never_gain(equal: float | None, seed: int) -> None:
     found = step(mass, v, np.zeros(d), rows, np.zeros(c), e if equal is None else equal)
     assert found.velocity @ mass @ found.velocity <= (1.0 + 1e-9) * (v @ mass @ v)
     assert (rows @ found.velocity).min() >= -1e-8 * np.abs(rows).max() * np.abs(v).max() * d
-
-
-def linkage() -> Mechanism:
-    """Two links in a chain and a free peg."""
-    inertia = np.diag([0.1, 0.1, 0.1])
-    elbow = (np.eye(3), np.array([1.0, 0.0, 0.0]))
-    return Mechanism(
-        [
-            Body("upper", None, Joint("revolute"), mass=1.0, inertia=inertia),
-            Body("lower", "upper", Joint("revolute"), elbow, mass=1.0, inertia=inertia),
-            Body("peg", None, Joint("planar"), mass=2.0, inertia=inertia),
-        ]
-    )
-
-
-def rows_of(
-    q: np.ndarray, bodies: list[tuple[int, int]], points: np.ndarray, normals: np.ndarray
-) -> np.ndarray:
-    a, b = np.array(bodies, np.int32).T
-    nothing = np.zeros(len(a), np.int32)
-    found = Contacts(
-        nothing, nothing, a, b, nothing.astype(np.int64), points, normals, np.zeros(len(a))
-    )
-    return contact_jacobian(normals, found, *model_of(linkage()).bodies(q)[1:])
-
-
-def test_a_straight_arm_struck_along_itself_has_no_row() -> None:
-    """Rounding leaves 1e-16 of a lever arm; as a row of its own it would take half the energy."""
-    q = np.array([0.7, 0.0, 0.0, 0.0, 0.0])
-    axis = np.array([[np.cos(0.7), np.sin(0.7), 0.0]])
-    assert not rows_of(q, [(1, -1)], 1.7 * axis, -axis).any()
 
 
 @pytest.mark.parametrize("friction", ["coulomb", "relaxed"])
@@ -381,49 +330,24 @@ def test_a_blow_through_resting_balls_is_one_impact_and_a_load_elsewhere_is_none
 
 # --- cost
 # ---------------------------------------------------------------------------------------------------------
-def row(count: int, space: bool, shape: dict[str, Any]) -> Scene:
-    """Bodies of one shape in a row on a floor."""
-    inertia, turn = ([1e-3] * 3, [0.05, 0, 0, 0, 1]) if space else (1e-3, [0.0])
-    bodies = (
-        {
-            "shapes": [shape],
-            "inertia": inertia,
-            "position": [0.12 * i, 0.0 if space else 0.05, *turn],
-        }
-        for i in range(count)
-    )
-    return scene_of(*bodies, space=space, floor=0.0, duration=0.003)
+def row(count: int) -> Scene:
+    """Discs in a row on a floor."""
+    disc = {"shapes": [CIRCLE], "inertia": 1e-3}
+    bodies = (disc | {"position": [0.12 * i, 0.05, 0.0]} for i in range(count))
+    return scene_of(*bodies, space=False, floor=0.0, duration=0.003)
 
 
 CIRCLE = {"kind": "circle", "radius": 0.05}
-BALL_ = {"kind": "sphere", "radius": 0.05}
-SQUARE = {"kind": "box", "size": [0.1, 0.1]}
-CUBE = {"kind": "box", "size": [0.1, 0.1, 0.1]}
-
-
-@pytest.mark.parametrize(
-    ("space", "shape", "most"),
-    [(False, CIRCLE, 1.0), (True, BALL_, 1.0), (False, SQUARE, 1.0), (True, CUBE, 2.0)],
-)
-def test_the_contacts_are_those_of_a_step_or_at_most_twice_as_many(
-    space: bool, shape: Any, most: float
-) -> None:
-    system = System(row(8, space, shape))
-    state = system.make_state()
-    cost = RigidConstraints().cost(system)
-    given = len(find_rows(system, state.q, state.v, np.inf).gap)
-    assert given <= cost.contacts * 1.3 and cost.contacts <= most * given * 1.2
-    assert cost.coordinates == system.mechanism.nv and cost.seconds > 0.0 and not cost.too_large
 
 
 def test_too_many_are_refused_before_the_first_step(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(time_stepping, "MOST_ENTRIES", 500)
-    assert run_world(row(4, False, CIRCLE), "ideal").complete
+    assert run_world(row(4), "ideal").complete
     for world in ("ideal", "ideal-friction"):
         with pytest.raises(
             ArgumentError, match=r"at most 500 numbers .* 36 contacts of 24 coordinates have 864"
         ):
-            run_world(row(8, False, CIRCLE), world)
+            run_world(row(8), world)
 
 
 PEG = load_scene(find_scene("peg_corner"))
@@ -461,21 +385,6 @@ def test_a_world_is_a_law_and_a_coupling_with_the_scenes_gains(name: str) -> Non
 def test_worlds_that_cannot_be_are_refused(call: Callable[[], Any], says: str) -> None:
     with pytest.raises(ArgumentError, match=says):
         call()
-
-
-def interrupt(done: int, total: int) -> None:
-    raise KeyboardInterrupt
-
-
-def test_an_incomplete_run_is_handed_on_only_to_who_asks_for_it() -> None:
-    with pytest.raises(KeyboardInterrupt):
-        run_world(PEG, "PB", progress=interrupt)
-    run = run_world(PEG, "PB", progress=interrupt, partial=True)
-    assert not run.complete and run.stopped == INTERRUPTED and 0 < run.steps < PEG.steps
-    with pytest.raises(IapbError, match="peg_corner in the world PB stopped after .* s: too fast"):
-        require_complete(replace(run, stopped="too fast"))
-    whole = replace(run, complete=True, stopped="")
-    assert require_complete(whole) is whole
 
 
 # --- order of the rigid worlds
@@ -523,43 +432,3 @@ def test_a_scene_with_a_hand_keeps_its_step_and_a_blow_at_the_start_its_place() 
     exact = 0.1 - 0.1 - 0.5 * 9.81 * 0.1**2
     assert ways[0] == pytest.approx(exact, rel=1e-12)
     assert ways[1] == pytest.approx(exact - 0.5 * 9.81 * 1e-3 * 0.1, rel=1e-12)
-
-
-@pytest.mark.parametrize("space", [False, True])
-@pytest.mark.parametrize("thing", ["box", "ball"])
-def test_what_lands_on_tiles_moves_as_on_one_floor(space: bool, thing: str) -> None:
-    """Thrown flat at 1.5 m/s, it crosses three seams, with the front and with all of its base."""
-    kind = {
-        ("box", False): {"kind": "box", "size": [0.1, 0.05]},
-        ("box", True): {"kind": "box", "size": [0.1, 0.08, 0.05]},
-        ("ball", False): {"kind": "circle", "radius": 0.025},
-        ("ball", True): {"kind": "sphere", "radius": 0.025},
-    }[thing, space]
-    body = {
-        "inertia": [2e-4] * 3 if space else 2e-4,
-        "shapes": [kind],
-        "position": [0.05, 0, 0.06, 0, 0, 0, 1] if space else [0.05, 0.06, 0],
-        "velocity": [1.5, 0, -1, 0, 0, 0] if space else [1.5, -1, 0],
-    }
-
-    def tile(low: float, high: float) -> dict[str, Any]:
-        across = [2.0, 0.1] if space else [0.1]
-        down = [0.0, -0.05] if space else [-0.05]
-        size = [high - low, *across]
-        return {"kind": "box", "size": size, "center": [0.5 * (low + high), *down]}
-
-    options = {"gravity": 9.81, "duration": 0.35, "contact": {"friction": 0.1}}
-    one, tiled = (
-        run_world(
-            scene_of(
-                body,
-                space=space,
-                walls=[tile(a, b) | {"name": f"tile_{k}"} for k, (a, b) in enumerate(floor)],
-                **options,
-            ),
-            "ideal-friction",
-        ).q[-1]
-        for floor in ([(-0.2, 1.0)], [(-0.2, 0.2), (0.2, 0.3), (0.3, 0.4), (0.4, 1.0)])
-    )
-    assert one[0] > 0.44
-    assert tiled == pytest.approx(one, abs=1e-9)
