@@ -407,24 +407,3 @@ def test_wrong_input_is_read_or_refused_and_valid_input_is_read(kind, tmp_path):
 
     damaged()
     assert outcomes[REFUSED] >= outcomes.total() // 4, "damage too mild to try anything"
-
-
-def test_a_careless_reader_is_caught(tmp_path, monkeypatch):
-    """The planted faults: a traceback and a swallowed hang; and one that is right."""
-
-    def careless(path):
-        raise KeyError(path.name)
-
-    def endless(path):
-        while True:
-            try:
-                sum(range(1000))
-            except Exception:
-                continue
-
-    def polite(path):
-        raise IapbError("no")
-
-    monkeypatch.setitem(globals(), "LONGEST", 0.1)
-    outcomes = [judge(reader, tmp_path / "x", b"")[0] for reader in (careless, endless, polite)]
-    assert outcomes == [BROKEN, BROKEN, REFUSED]
