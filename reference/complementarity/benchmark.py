@@ -7,14 +7,13 @@ Source of the profile: Dolan and Moré, Benchmarking optimization software with 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
 from iapb.errors import MissingDependencyError
-from reference import Floats
 from reference.complementarity.problem import SYMMETRY_TOLERANCE, ImpactProblem
 from reference.complementarity.solution import Residuals, Solution, velocity_scale
 from reference.complementarity.solvers import solve, solver_names
@@ -94,21 +93,3 @@ def run_solvers(
         )
     slow.update({s.solver: s.seconds for s in found if s.seconds > longest})
     return rows + missing + left_out
-
-
-def performance_profile(rows: Sequence[SolverRow], factors: Floats) -> dict[str, Floats]:
-    """Return per solver the share of problems solved within each factor (>= 1) of the fastest
-    solver's time.
-
-    All problems count, including those that no solver solved. A solver that is not installed has no
-    curve.
-    """
-    names = sorted({row.solver for row in rows if row.verdict != "missing"})
-    problems = sorted({row.problem for row in rows})
-    times = np.full((len(names), len(problems)), np.inf)
-    for row in rows:
-        if row.verdict == "solved":
-            times[names.index(row.solver), problems.index(row.problem)] = row.seconds
-    best = times.min(axis=0, initial=np.inf)
-    ratios = np.where(np.isfinite(times), times / np.where(np.isfinite(best), best, 1.0), np.inf)
-    return {name: (ratios[i][:, None] <= factors).mean(axis=0) for i, name in enumerate(names)}

@@ -164,8 +164,15 @@ def shared(tmp_path_factory):
     return tmp_path_factory.mktemp("shared")
 
 
+SLOW = {"compare_worlds": pytest.mark.thorough, "figure_of_the_paper": pytest.mark.thorough}
+
+
 @pytest.mark.parametrize(
-    "path", sorted((ROOT / "examples").glob("*.py")), ids=lambda path: path.stem
+    "path",
+    [
+        pytest.param(path, id=path.stem, marks=SLOW.get(path.stem, ()))
+        for path in sorted((ROOT / "examples").glob("*.py"))
+    ],
 )
 def test_example(path, shared, capfd):
     with contextlib.chdir(shared):

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from verification.clock import sampler, seconds, take_turns
+from verification.clock import sampler, take_turns
 from verification.finding import Failure
 
 
@@ -38,26 +38,6 @@ def test_a_contestant_that_raises_is_a_failure_and_leaves() -> None:
     ]
     with pytest.raises(ZeroDivisionError):
         take_turns({"bad": lambda: 1.0 / 0.0}, 3)
-
-
-def test_who_has_had_enough_takes_no_more_than_the_least_rounds() -> None:
-    found = take_turns({"slow": lambda: 1.0, "fast": lambda: 1e-3}, 9, enough=0.5)
-    assert (found["slow"].rounds, found["fast"].rounds) == (3, 9)
-
-
-def test_a_call_that_repeats_itself_is_not_called_from_python() -> None:
-    class Call:
-        calls = repeated_times = 0
-
-        def repeated(self, times: int) -> None:
-            self.repeated_times += times
-
-        def __call__(self) -> None:
-            self.calls += 1
-
-    call = Call()
-    seconds(call, 7)
-    assert (call.calls, call.repeated_times) == (0, 7)
 
 
 def test_the_first_call_does_not_say_how_many_a_sample_needs() -> None:

@@ -11,11 +11,9 @@ from verification.check import Study
 from verification.claims.speed import C19, C22
 from verification.cost import growth, impact_times, robots, steps
 from verification.cost.accuracy import BUDGET_ROWS, COMPILED, LEMKE, PYTHON
-from verification.cost.steps import IDEAL
 from verification.cost.trajectories import (
     BELOW,
     MOTIONS,
-    TIMED_OUT,
     WORTH,
     falling,
     runs_of,
@@ -23,7 +21,7 @@ from verification.cost.trajectories import (
     worth,
 )
 from verification.finding import NOT_COMPUTED, REFUTED, REPRODUCED, Finding
-from verification.haptic_rate import BENCH, DERIVED, RATIOS, TOPIC, quoted, quoting
+from verification.haptic_rate import BENCH, DERIVED, RATIOS, TOPIC, quoting
 from verification.numbers import read_values
 from verification.table import Table
 
@@ -192,27 +190,6 @@ def test_ratios_are_ours_over_theirs_and_a_case_above_the_limit_counts(tables: T
     )
 
 
-def test_the_numbers_of_the_page_name_the_motion_in_which_another_world_is_more_exact(
-    tables: Tables,
-) -> None:
-    behind = _motions(IAPB=(1e-1, 1e-2), MuJoCo=(1e-1, 5e-3))
-    values = quoted(_whole(tables | {MOTIONS.key: behind}))
-    assert (values["motions"], values["motions_most_exact"]) == (1, 0)
-    assert values["motions_behind"] == "ball" and values["motions_behind_error"] == pytest.approx(2)
-    assert values["rigid_scenes_dearer"] == values["rigid_scenes_that_tell"] == 1
-    assert values["most_contacts_iapb_12"] == 1200
-
-
-def test_what_a_tenfold_accuracy_costs() -> None:
-    """Error over time with slope −1/2 costs a hundredfold; a level error costs nothing to know."""
-    table = _motions(good=(1e-1, 1e-2, 1e-3), late=(2e-1, 2e-1, 2e-1))
-    good, late = (worth(table, name) for name in ("good", "late"))
-    assert good["tenfold accuracy costs [times]"] == pytest.approx(100.0)
-    assert good["smallest error of all [scenes]"] == 1
-    assert late["tenfold accuracy costs [times]"] is None
-    assert late["smallest error of all [scenes]"] == 0
-
-
 @pytest.mark.parametrize(
     ("errors", "used", "cost"),
     [
@@ -231,13 +208,6 @@ def test_a_fit_takes_the_runs_on_which_the_error_falls(
     kept = falling(runs_of(_motions(good=errors)))
     assert tuple(run["position"] for run in kept) == used
     assert tenfold_cost(kept) == (cost and pytest.approx(cost))
-
-
-def test_runs_that_failed_or_were_too_slow_are_counted() -> None:
-    table = MOTIONS.table_of(
-        [_run(IDEAL, 1.0, 1e-2, 1.0), _run(IDEAL, 0.1, None, 1e9, outcome=TIMED_OUT)]
-    )
-    assert worth(table, IDEAL)["failed or too slow [runs]"] == 1
 
 
 def test_a_report_measures_each_quantity_once_and_quotes_it(tables: Tables) -> None:

@@ -288,22 +288,6 @@ def test_a_tilted_cube_on_a_large_one_is_as_deep_as_its_lowest_corner(swapped: b
     assert np.abs(found.normal[:, 2]) == pytest.approx(1.0, abs=1e-12)  # of the large face
 
 
-@pytest.mark.parametrize("turn", [0.0, 0.5 * np.pi, np.pi])
-@pytest.mark.parametrize("offset", [(0.4, 0.0), (0.0, -0.3), (0.0, 0.0), (0.25, 0.1)])
-@pytest.mark.parametrize("noise", [0.0, 1e-16, -1e-16, 1e-13])
-def test_aligned_cubes_touch_at_the_corners_of_their_overlap(
-    turn: float, offset: tuple[float, float], noise: float
-) -> None:
-    """Edges that lie on one another lose no corner to rounding, and count none twice."""
-    x, y = offset
-    place = [x + noise, y - noise, 1.0 - 1e-6, noise, noise, np.sin(0.5 * turn), np.cos(0.5 * turn)]
-    system = pair_of({**CUBE, "size": [1.0, 1.0, 1.0]}, {**CUBE, "size": [1.0, 1.0, 1.0]})
-    found = system.contacts_at(at_places(system, place, [0, 0, 0, 0, 0, 0, 1]), 0.0)
-    ends = [sorted((max(o, 0.0) - 0.5, min(o, 0.0) + 0.5)) for o in offset]
-    wanted = sorted((a, b) for a in ends[0] for b in ends[1])
-    np.testing.assert_allclose(sorted(map(tuple, found.point[:, :2].round(9))), wanted, atol=1e-8)
-
-
 @SPACES
 def test_every_side_of_a_box_that_a_ball_can_touch_has_a_name_of_its_own(space: bool) -> None:
     """8 regions around a rectangle, 26 around a cuboid; inside, those of the faces."""
@@ -321,32 +305,6 @@ def test_every_side_of_a_box_that_a_ball_can_touch_has_a_name_of_its_own(space: 
             found = system.contacts_at(at_places(system, place.tolist(), [0.0] * n), 1.0)
             assert names.setdefault(int(found.feature[0]), tuple(signs)) == tuple(signs)
     assert len(names) == 3**n - 1
-
-
-def test_faces_of_two_cubes_never_share_a_name() -> None:
-    """Six faces of the one against six of the other, each box as the one that clips: no name occurs
-    twice."""
-    owners: dict[int, tuple[Any, ...]] = {}
-    turns = [
-        np.zeros(3),
-        *([np.pi / 2 * s * np.eye(3)[k] for k in range(3) for s in (1, -1)]),
-        np.array([np.pi, 0, 0]),
-    ]
-    for sizes in ([1.0, 0.8], [0.8, 1.0]):
-        system = pair_of(*({"kind": "box", "size": [size] * 3} for size in sizes))
-        for axis, side, turn in (
-            (k, s, turn) for k in range(3) for s in (1.0, -1.0) for turn in turns
-        ):
-            q = system.mechanism.integrate(
-                system.mechanism.neutral(), np.concatenate([np.zeros(9), turn])
-            )
-            q[:3] = side * 0.899 * np.eye(3)[axis]
-            facing = system.mechanism.placements(q)[0][1].T @ (side * np.eye(3)[axis])
-            found = system.contacts_at(q)
-            owner = (sizes[0], axis, side, *facing.round(6).tolist())
-            assert len(found.gap) == 4
-            for feature in found.feature.tolist():
-                assert owners.setdefault(feature, owner)[1:] == owner[1:]
 
 
 # --- the whole of a run

@@ -211,17 +211,6 @@ def test_subnormal_speeds_have_the_nearest_result_that_exists() -> None:
     assert resolve_impact([[3.0]], [[1.0]], [-5e-324], 0.0).velocity[0] == 0.0
 
 
-def test_of_a_mass_matrix_with_rounding_in_it_the_symmetric_part_counts() -> None:
-    M, J, v = problem(3)
-    skew = 1e-11 * np.triu(M, 1)
-    given, symmetric, plain = (
-        resolve_impact(each, J, v, 0.4).velocity
-        for each in (M + skew, M + 0.5 * (skew + skew.T), M)
-    )
-    np.testing.assert_allclose(given, symmetric, rtol=1e-14, atol=1e-14)
-    assert not np.allclose(given, plain, rtol=1e-14, atol=1e-14)
-
-
 @given(
     seed=st.integers(0, 10_000),
     d=st.integers(1, 6),
@@ -271,19 +260,13 @@ NEAR = [[1.0, 0.0, 0.0], [1.0, 1e-4, 0.0]]
     [
         (np.eye(3), V, {}, "complete", 3),
         (np.eye(3), V, {"budget": 2}, "budget", 2),
-        (np.eye(3)[:2], V, {"budget": 2}, "complete", 2),
-        (np.eye(3), V, {"budget": 3}, "complete", 3),
         (np.eye(3), V, {"budget": 0}, "budget", 0),
         (np.eye(3), V, {"budget": 10**30}, "complete", 3),
-        (np.tile([1.0, 0.0, 0.0], (6, 1)), V, {"budget": 1}, "complete", 1),
         (NEAR, V, {"budget": 1, "rank_tolerance": 1e-3}, "complete", 1),
         (NEAR, V, {"budget": 1, "rank_tolerance": 1e-5}, "budget", 1),
-        (NEAR, V, {"rank_tolerance": 1e-3}, "complete", 1),
-        (NEAR, V, {"rank_tolerance": 1e-5}, "complete", 2),
         ([[1.0, 0.0, 0.0], [1.0, 1e-9, 0.0]], V, {}, "complete", 2),
         ([[1.0, 0.0, 0.0], [1.0, 1e-11, 0.0]], V, {}, "complete", 1),
         ([[1.0, 0.0, 0.0]], [-1e-300, 1e100, 0.0], {}, "cancelled", 1),
-        ([], V, {}, "complete", 0),
         (np.zeros((2, 3)), V, {}, "complete", 0),
     ],
 )
@@ -538,13 +521,6 @@ def test_friction_obeys_coulomb_keeps_restitution_and_gains_nothing(most: float)
     assert most == 1.0 or seen["reduced"] > 0
 
 
-@pytest.mark.parametrize("seed", [12, 41, 45, 104, 133, 172, 233, 354, 369])
-def test_limits_that_swing_at_first_settle(seed: int) -> None:
-    """Without damping, or with another one than half and a fifth, these do not within the
-    rounds."""
-    assert resolve_frictional_impact(*rubbing(seed, 1.0)).status in ("complete", "scaled")
-
-
 def test_friction_that_loads_its_own_contact_is_solved_exactly() -> None:
     """A contact that slides while μ ∂p_n/∂p_t is 0.9: p_t = −μ p_n, which plain rounds approach by
     a tenth each."""
@@ -556,20 +532,6 @@ def test_friction_that_loads_its_own_contact_is_solved_exactly() -> None:
     assert found.status == "complete" and found.friction_share == 1.0
     assert found.tangential_impulses[0, 0] == pytest.approx(-mu * found.impulses[0], rel=1e-9)
     assert (jacobian @ found.velocity)[1] == pytest.approx(0.0, abs=1e-12)
-
-
-@pytest.mark.parametrize("power", [-40, 0, 40])
-def test_in_a_corner_friction_has_nothing_to_do_in_any_unit_of_mass(power: int) -> None:
-    """Where every tangent is the other contact's normal, what is left of it is rounding, however
-    light the mass."""
-    for seed in range(20):
-        M, _, v = problem(seed, d=2)
-        normals = np.linalg.qr(np.random.default_rng(seed).normal(size=(2, 2)))[0]
-        found = resolve_frictional_impact(4.0**power * M, normals, normals[::-1, None], v, 0.3, 0.8)
-        assert np.array_equal(
-            found.velocity, resolve_impact(4.0**power * M, normals, v, 0.3).velocity
-        )
-        assert not found.tangential_impulses.any()
 
 
 @given(seed=st.integers(0, 300), mass=st.integers(-60, 60), speed=st.integers(-100, 100))

@@ -38,45 +38,31 @@ BORDERS = {
 
 MASSES: list[tuple[Any, str]] = [
     ([[1.0, 0.0]], ""),
-    ([], ""),
     (np.zeros((0, 0)), ""),
-    (2.0, ""),
     ("heavy", ""),
     (np.eye(2) * (1 + 1j), ""),
-    (np.eye(2, dtype=bool), ""),
     ([["1", "0"], ["0", "1"]], ""),
     ([[10**400, 0], [0, 1]], "[0, 0]"),
-    (np.array([[1, True], [True, 2]], dtype=object), ""),
     ([[1.0, NAN], [NAN, 1.0]], "[0, 1]"),
     ([[1.0, 0.0], [0.0, INF]], "[1, 1]"),
     ([[1.0, 0.2], [0.1, 1.0]], "[0, 1]"),
-    ([[1.0, 0.0], [0.0, 0.0]], "[1, 1]"),
     ([[1.0, 0.0], [0.0, -1.0]], "[1, 1]"),
-    ([[-1.0, 0.0], [0.0, -2.0]], "[1, 1]"),
     ([[1.0, 3.0], [3.0, 1.0]], "[0, 1]"),
-    ([[1.0, -3.0], [-3.0, 1.0]], "[0, 1]"),
     ([[1.0, 1.1], [1.1, 1.0]], ""),
     ([[1.0, 1.0], [1.0, 1.0]], ""),
-    ([[1e-300, 1e300], [1e300, 1e-300]], "[0, 1]"),
-    ([[1e-300, 1e300], [-1e300, 1e-300]], "[0, 1]"),
     ([[1.0, 2e-9], [0.0, 1.0]], "[0, 1]"),
 ]
 VELOCITIES: list[tuple[Any, str]] = [
     ([1.0], ""),
-    ([[1.0, 2.0]], ""),
     ([NAN, 1.0], "[0]"),
-    ([1.0, -INF], "[1]"),
     (None, ""),
     (np.array([1, 2], dtype="timedelta64[s]"), ""),
 ]
 ROWS: list[tuple[Any, str]] = [
     ([[1.0]], ""),
-    ([1.0, 2.0], ""),
     (np.zeros((3, 0)), ""),
-    (np.zeros((0, 5)), ""),
     ([[1.0, 2.0], [3.0]], ""),
     ([[1.0, INF], [0.0, 1.0]], "[0, 1]"),
-    ([[1.0, 0.0], [NAN, 1.0]], "[1, 0]"),
     (np.ma.masked_array([[1.0, 0.0]], [[False, True]]), ""),
 ]
 ONE_BY_ONE = (
@@ -226,9 +212,7 @@ def test_fractions_and_whole_numbers_in_object_arrays_are_numbers() -> None:
     ("make", "values", "named"),
     [
         (Penalty, {"integrator": "euler"}, "integrator"),
-        (ImpulseAugmented, {"rendering": "clip"}, "rendering"),
         (ImpulseAugmented, {"friction_in_impacts": "yes"}, "friction_in_impacts"),
-        (ImpulseAugmented, {"pushing": 1}, "pushing"),
         (ImpulseAugmented, {"pushing": True, "friction_in_impacts": True}, "pushing"),
     ],
 )

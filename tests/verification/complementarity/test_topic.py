@@ -8,14 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from reference.complementarity.problem import ImpactProblem
-from reference.datasets import StoredProblem
 from tests.reference.fclib_files import local_file
 from verification.check import Study
 from verification.complementarity import extensions
 from verification.complementarity.extensions import FRICTION, UNEQUAL
 from verification.complementarity.of_runs import scene_impacts
-from verification.complementarity.solvers import SCENES, collections, study_read
+from verification.complementarity.solvers import SCENES, collections
 from verification.finding import REFUTED
 
 
@@ -66,12 +64,3 @@ def test_a_folder_of_problems(tmp_path: Path) -> None:
     assert skew["asymmetry of W"] > 0.1 and (skew["daqp"], skew["lemke"]) == ("refused", "solved")
     assert damaged["daqp"] == "not read" and "size 3 with 2 numbers" in damaged["why not read"]
     assert check.judge(table)[0].verdict == REFUTED and table.holds == (True, True, False)
-
-
-def test_a_slow_solver_is_not_asked_for_more_and_a_problem_without_solution_fails() -> None:
-    unsolvable = ImpactProblem.from_delassus([[0.0]], [-1.0], name="unsolvable")
-    larger = ImpactProblem.from_delassus(np.eye(2), [-1.0, -1.0], name="larger")
-    lines = study_read("few", [StoredProblem(larger), StoredProblem(unsolvable)], longest=0.0).lines
-    assert {line["daqp"] for line in lines} == {"failed", "left out"} and "solved" not in lines[
-        1
-    ].values()

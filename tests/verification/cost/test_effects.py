@@ -13,17 +13,14 @@ from iapb.scene import Scene, SpatialScene, scene_names
 from reference.worlds import find_world
 from tests.iapb.contact.paper import scene_of
 from verification.cost.effects import (
-    MOVES,
     SAME,
     SWITCHED,
     Loop,
     effects_of,
-    matrix,
     numbers_of,
     step_of,
     steps_table,
 )
-from verification.table import table_from
 
 
 def _scene(name: str, duration: float) -> Scene:
@@ -106,15 +103,3 @@ def test_the_time_saved_is_measured_on_one_motion_beside_its_noise() -> None:
     numbers = numbers_of(steps_table([row]))
     assert (numbers["scenes"], numbers["effects_on"]) == (1, row["effects on"])
     assert numbers["alone"] and numbers["saved_median"] == pytest.approx(0.01 * row["saved [%]"])
-
-
-def test_a_matrix_has_a_column_for_each_effect_that_some_scene_needs() -> None:
-    keys = ("effect", "active", "without it")
-    rows = [("gravity", True, MOVES), ("friction", False, None), ("touch", True, SAME)]
-    one, two = (
-        table_from(dict(zip(keys, row, strict=True)) for row in given)
-        for given in (rows, [("gravity", False, None), *rows[1:]])
-    )
-    table = matrix({"one": one, "two": two})
-    assert table.keys == ["scene", "gravity", "touch"]
-    assert table.rows == (("one", "on", "idle"), ("two", "off", "idle"))

@@ -12,7 +12,6 @@ from verification.hard_cases import judge_hard_case as judged
 from verification.hard_cases.case import (
     DEPENDS_ON_ROUNDING,
     NEWTON_COULOMB,
-    NOT_TRIED,
     STABLE,
     AnyCase,
 )
@@ -89,15 +88,3 @@ def test_the_verdict_can_be_other_than_stable(name: str, method: str, verdict: s
     case = HARD_CASES[name]()
     assert method in judge.methods_for(case)
     assert (found := judged(case, method))["outcome"] == verdict, found
-
-
-def test_what_forms_the_delassus_matrix_of_ten_thousand_contacts_is_not_tried_and_its_row_says_so() -> (
-    None
-):
-    case = HARD_CASES["ten_thousand_contacts"]()
-    for method in ("gram_pinv", "gram_cholesky", "damped"):
-        row = judged(case, method)
-        assert (row["outcome"], row["rank"]) == (NOT_TRIED, None)
-        assert "at most 2,000 contacts" in row["note"]
-    assert judged(case, "svd")["outcome"] == STABLE
-    assert judged(HARD_CASES["hundred_contacts"](), "gram_pinv")["outcome"] == STABLE

@@ -90,19 +90,14 @@ def test_gains_in_real_arithmetic_are_graded() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"impacts": 0}, "impacts = 0: expected a whole number, 1 or more"),
         ({"contract": "one-sided"}, "expected one of equality, unilateral, frictional"),
         ({"laws": ["pushin"], "contract": "unilateral"}, "did you mean pushing?"),
-        ({"laws": []}, "at least one of kinetic_energy"),
         ({"laws": 1}, "laws = 1: expected names of laws"),
         (
             {"contract": "frictional", "unequal_restitution": True},
             "False with contract 'frictional'",
         ),
-        ({"seed": -1}, "seed = -1: expected a whole number"),
-        ({"seed": 1.5}, "seed = 1.5"),
         ({"call_limit": 0.0}, "call_limit = 0.0: expected seconds above 0"),
-        ({"seed": "3"}, "seed = "),
     ],
 )
 def test_what_would_judge_nothing_is_refused(options: dict[str, object], message: str) -> None:

@@ -142,37 +142,6 @@ def test_a_child_is_the_resolver_and_starts_anew() -> None:
         child.close()
 
 
-@pytest.mark.thorough
-def test_nothing_of_the_resolver_is_printed_while_the_kit_searches(
-    capfd: pytest.CaptureFixture[str],
-) -> None:
-    told: list[int] = []
-
-    def loud(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-        print("loud") if told and told[-1] else None
-        return 1.5 * v
-
-    check_passivity(
-        loud, impacts=20, search=40, progress=lambda done, total: told.append(total != 20)
-    )
-    assert told[-1] and "loud" not in capfd.readouterr().out
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize(
-    ("resolver", "words"),
-    [
-        (lambda *given: sound_resolver(*given).astype(np.float32), "single precision"),
-        (lambda *given: sound_resolver(*given) * (1.0 + 1e-6), "No error is above"),
-        (lambda M, J, v, e: np.round(2.0 * v), ""),
-        (lambda M, J, v, e: 0.0 * v, ""),
-    ],
-)
-def test_hints_appear_where_they_apply(resolver: Callable[..., Any], words: str) -> None:
-    report = check_passivity(resolver, impacts=20, search=0)
-    assert not report.passed and [words in hint for hint in report.hints] == [True] * bool(words)
-
-
 def test_no_process_of_its_own_where_none_can_be_forked(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delattr("os.fork")
     with pytest.raises(ArgumentError, match="own_process"):

@@ -65,18 +65,6 @@ def test_a_grazing_cradle_may_lose_an_impulse_below_rounding_in_another_frame(in
     assert broken is not None and not broken.passed
 
 
-def test_the_plan_covers_every_part_once() -> None:
-    batches = study.plan(1_000_000, 5000)
-    assert {batch.part for batch in batches} == set(study.PARTS)
-    impacts = sorted((batch.first, batch.count) for batch in batches if batch.part == study.IMPACTS)
-    assert sum(count for _, count in impacts) == 1_000_000
-    assert all(
-        first + count == following
-        for (first, count), (following, _) in zip(impacts, impacts[1:], strict=False)
-    )
-    assert sum(batch.count for batch in batches if batch.part == study.TRAJECTORIES) == 5000
-
-
 def test_the_sum_over_batches_does_not_depend_on_how_the_cases_are_cut() -> None:
     subject = study.subject_of(wrong_sign)
     cut = [study.judge_batch(study.Batch(study.IMPACTS, first, 10), subject) for first in (0, 10)]

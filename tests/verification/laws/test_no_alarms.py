@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -17,10 +16,9 @@ from reference.complementarity import ImpactProblem, solve
 from reference.exact import exact_impact
 from tests.verification.laws.faults import moreau, newton, poisson
 from verification import check_passivity
-from verification.impacts import draw_frictional_case, draw_wide_case
+from verification.impacts import draw_wide_case
 from verification.laws import LAWS, sound_resolver
 from verification.laws.bounds import KIT
-from verification.laws.contracts import distance_from_cone
 
 SEEDS, IMPACTS = (
     (100, 5000) if os.environ.get("IAPB_HYPOTHESIS_PROFILE") == "deep" else (1, 100)
@@ -68,7 +66,7 @@ def test_a_sound_resolver_passes_at_every_seed(name: str, seed: int) -> None:
     report = check_passivity(
         resolver,
         contract=contract,
-        impacts=IMPACTS,
+        impacts=IMPACTS if name == "iapb" else max(IMPACTS // 3, 30),
         seed=seed,
         search=0,
         patience=np.inf,
@@ -90,25 +88,3 @@ def test_many_dependent_rows_may_be_reduced_to_any_of_them() -> None:
     assert (case.coordinates, case.contacts, len(case.row_space)) == (26, 409, 19)
     residual = LAWS["groups"].check(case, resolve_impact, KIT)
     assert residual.value <= 0.01 * residual.tolerance < 1e-9
-
-
-def test_the_distance_from_the_cone_of_two_sliding_contacts_on_dependent_rows_is_zero() -> None:
-    """Two contacts of a body in space have five independent rows; the search by rays alone ends
-    above 1e-7 in some."""
-    rng = np.random.default_rng(3)
-    for number in range(2, 500, 5):
-        case = draw_frictional_case(rng, number)
-        assert case.tangents is not None and case.friction is not None
-        normal = rng.uniform(0.1, 1.0, case.contacts)
-        angle = rng.uniform(0.0, 2.0 * np.pi, case.contacts)
-        sliding = (case.friction * normal)[:, None] * np.column_stack(
-            [np.cos(angle), np.sin(angle)]
-        )
-        push = np.concatenate([normal, sliding.ravel()])
-        target = push @ case.with_tangents.rows
-        target = target / np.linalg.norm(target)
-        unit = replace(case, restitution=0.0)
-        assert distance_from_cone(unit, target) <= 1e-8
-        beyond = np.concatenate([normal, 1.01 * sliding.ravel()]) @ case.with_tangents.rows
-        if case.contacts == 1 and case.friction[0] > 0.0:
-            assert distance_from_cone(unit, beyond / np.linalg.norm(beyond)) > 1e-5

@@ -22,7 +22,7 @@ def drawn(request: pytest.FixtureRequest) -> list[SceneCase]:
 
 def test_random_trajectories_keep_every_law(drawn: list[SceneCase]) -> None:
     applied = set()
-    for case in drawn[:30]:
+    for case in drawn[:20]:
         for law, residual in judge_run(case.simulate()):
             applied.add(law)
             assert residual.passed, (case, residual)

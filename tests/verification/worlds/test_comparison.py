@@ -11,15 +11,10 @@ import pytest
 
 from iapb.errors import IapbError, SolverError
 from iapb.scene import Scene, load_scene
-from reference.complementarity import benchmark, solvers
-from reference.complementarity.solution import Answer
-from reference.complementarity.solvers import SOLVERS, SolverEntry
 from reference.worlds import run_world
 from verification import compare_worlds, worlds
-from verification.complementarity import solvers as problem_files
 from verification.complementarity.of_runs import RUBBING, problems_of_run
-from verification.finding import MIXED, NOT_COMPUTED, REPRODUCED
-from verification.worlds import default_worlds
+from verification.finding import MIXED, NOT_COMPUTED
 
 HERE = Path(__file__).parent
 SLOPE = load_scene(HERE / "slope.yaml").with_values({"duration": 0.2})
@@ -71,16 +66,6 @@ def test_a_hinge_and_a_ball_count_by_their_inertia():
     assert row(found, "IAPB")["energy lost"] == pytest.approx(lost - 0.0225, abs=1e-9)
 
 
-def test_the_reference_world_joins():
-    assert default_worlds(SLOPE) == ("IAPB", "PB", "IAPB-friction", "ideal", "ideal-friction")
-    smooth = SLOPE.with_values({"contact.friction": 0.0, "duration": 0.002})
-    found = compare_worlds(smooth, ["PB"], impacts=0)
-    assert (
-        found.tables["worlds"].column("world") == ["PB", "ideal"]
-        and found.details["against"] == "ideal"
-    )
-
-
 def test_a_world_that_fails_is_named_and_the_others_are_compared(monkeypatch):
     def breaks(scene, world, **options):
         if world == "PB":
@@ -118,18 +103,6 @@ def test_worlds_are_ordered_only_beyond_the_error_of_the_reference(moved, ordere
     assert f"ideal itself moves by {1e3 * own:.3g} mm at half its step" in found.answer
 
 
-def test_without_half_a_step_there_is_no_order(monkeypatch):
-    def breaks(scene, world, **options):
-        if scene.rate > SLOPE.rate:
-            raise SolverError("no solution")
-        return run_world(scene, world, **options)
-
-    monkeypatch.setattr(worlds, "run_world", breaks)
-    found = compare_worlds(SLOPE.with_values({"duration": 0.01}), ["IAPB", "PB"], impacts=0)
-    assert "No order of the worlds: ideal-friction fails at half its step" in found.answer
-    assert [one.case for one in found.failures] == ["ideal-friction at half its step"]
-
-
 def test_worlds_that_stop_early_or_are_not_to_be_trusted_are_not_ranked(monkeypatch):
     def spoilt(scene, world, **options):
         run = run_world(scene, world, **options | ({"steps": 7} if world == "PB" else {}))
@@ -157,59 +130,6 @@ def test_worlds_that_stop_early_or_are_not_to_be_trusted_are_not_ranked(monkeypa
     assert (
         "the reference PB stopped" in compare_worlds(short, ["IAPB", "PB"], "PB", impacts=0).answer
     )
-
-
-def wrong(problem):
-    """A solver that is content with no impulse at all."""
-    return Answer(np.zeros(problem.size), "done")
-
-
-def test_every_solver_is_judged_on_the_impacts_by_residuals(monkeypatch):
-    load = solvers._load
-    monkeypatch.setattr(
-        solvers,
-        "_load",
-        lambda name, entry: wrong if name.startswith("wrong") else load(name, entry),
-    )
-    kept = {"gauss_seidel": "lcp", "nsgs": "cone", "wrong": "lcp", "wrong with friction": "cone"}
-    for name, takes in kept.items():
-        monkeypatch.setitem(
-            SOLVERS, name, SOLVERS.get(name) or SolverEntry("nowhere", "numba", "", takes)
-        )
-
-    def asked(names):
-        def chosen(problem):
-            return [
-                name for name in names if (kept[name] == "cone") == (problem.friction is not None)
-            ]
-
-        for module in (problem_files, benchmark):
-            monkeypatch.setattr(module, "solver_names", chosen)
-        return compare_worlds(DOOR, ["IAPB"], "IAPB", impacts=2)
-
-    found = asked(kept)
-    rows = {
-        one["solver"]: (one["solved"], one["failed"], one["problems"])
-        for one in found.tables["solvers"].records()
-    }
-    assert rows == {
-        "gauss_seidel": (1, 0, 1),
-        "nsgs": (1, 0, 1),
-        "wrong": (0, 1, 1),
-        "wrong with friction": (0, 1, 1),
-    }
-    part = {part.name: part for part in found.parts}["solvers"]
-    assert (part.verdict, part.held, part.decided) == (MIXED, 2, 4)
-    assert (
-        "2 of 4 answers" in part.sentence
-        and "Wrong answers: wrong 1, wrong with friction 1." in part.sentence
-    )
-    right = asked(["gauss_seidel", "nsgs"])
-    assert {part.name: part.verdict for part in right.parts} == dict.fromkeys(
-        ("runs", "motion", "solvers"), REPRODUCED
-    )
-    alone = asked(["wrong", "wrong with friction"])
-    assert {part.name: part.verdict for part in alone.parts}["solvers"] == MIXED
 
 
 # Two balls fall on walls of their own; the second also on one without friction.
