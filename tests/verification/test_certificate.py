@@ -24,6 +24,7 @@ from iapb import (
 )
 from iapb.contact.laws import ImpulseAugmented
 from iapb.run import Run, digests
+from iapb.scene import scene_from_text
 from verification.certificate import exact_gain, judge_gains
 
 
@@ -340,3 +341,22 @@ def test_a_gain_that_no_double_can_hold_is_a_gain(
     """The first raised, the second had 0 as its largest gain."""
     found = certify_impacts(np.eye(2), [before], [after])
     assert found.gains == (largest > 0.0) and found.largest_gain == largest
+
+
+def test_a_weak_impact_of_a_fast_body_is_known_up_to_the_rounding_of_its_velocity() -> None:
+    """A disc flies along a wall at 1 km/s and meets it at 10 µm/s: v⁺ − v⁻ has eight digits."""
+    run = simulate(
+        scene_from_text("""name: grazing
+rate: 1000
+duration: 0.01
+contact: {restitution: 1}
+bodies:
+  - {name: disc, joint: planar, mass: 1, inertia: 1, position: [0.06000000001, 0.08, 0],
+     velocity: [799.999994, -600.000008, 0], shapes: [{kind: circle, radius: 0.1}]}
+walls: [{name: wall, kind: half_plane, point: [0, 0], normal: [0.6, 0.8]}]
+""")
+    )
+    assert len(run.impacts.step) == 1
+    assert certify(run).passed
+    wrong = replace(run.impacts, impulse=run.impacts.impulse * (1.0 + 1e-6))
+    assert certify(replace(run, impacts=wrong)).momentum > 1e-7
