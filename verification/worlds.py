@@ -433,7 +433,10 @@ def compare_impacts(
     """Return the parts on the impacts of an IAPB run, and the tables "solvers" and "problems"."""
     struck = problems_of_run(run, scene)
     if not struck:
-        said = f"No impact of {scene.name} can be given to solvers: nothing collides."
+        why = (
+            "bodies strike several times in a step" if len(run.impacts.step) else "nothing collides"
+        )
+        said = f"No impact of {scene.name} can be given to solvers: {why}."
         return [Part(said, NOT_TESTABLE, "impacts", optional=True)], {}
     problems = [
         problem

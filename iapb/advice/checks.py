@@ -423,7 +423,9 @@ def check_scene(
     chosen = chosen.within(scene) if hasattr(chosen, "within") else chosen
     start = Start(scene)
     uses = frozenset[str](getattr(chosen, "uses", ()))
-    found = [*_degrees(scene), *_inertias(scene), *_overlaps(start), *_fast(start)]
+    found = [*_degrees(scene), *_inertias(scene), *_overlaps(start)]
+    if laws.IMPULSES not in uses or not scene.contact.at_touch:
+        found += _fast(start)
     if laws.PENALTY in uses and not scene.contact.rigid:
         found += _sags(start)
     integrator = getattr(chosen, "integrator", "semi_implicit_euler")
@@ -588,7 +590,7 @@ def _fast(start: Start) -> Iterator[Caution]:
             f"{other} meets {thin} at {speed:.3g} m/s, "
             f"{in_metres(speed * start.dt)} in a step, and the thinner is {in_metres(size)}: it "
             f"sinks in or "
-            f"passes through; set rate >= {_up(4.0 * speed / size):g} Hz",
+            f"passes through; set rate >= {_up(4.0 * speed / size):g} Hz, or impacts at the touch",
         )
 
 
