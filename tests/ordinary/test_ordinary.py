@@ -19,7 +19,14 @@ from verification.scenes.books import risen
 LAWS = {
     "IAPB": [*CASES],
     "PB": ["ball_rolls", "tower_5", "ratio_1e6", "arch", "peg_jams", "ladder_slips"],
-    "ideal": ["double_pendulum", "slider_on_a_turning_arm", "box_meets_a_seam_exactly"],
+    "ideal": [
+        "spin_plate_10",
+        "spin_off_centre_30",
+        "heavy_top",
+        "double_pendulum",
+        "slider_on_a_turning_arm",
+        "box_meets_a_seam_exactly",
+    ],
     "ideal-friction": [
         "bounce_50_percent",
         "ladder_stands",

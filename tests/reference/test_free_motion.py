@@ -27,7 +27,6 @@ from reference.rigid_body import model_of
 from reference.scene_events import scene_truth
 from reference.time_stepping import RigidConstraints
 from tests.reference.scenes import G, scene_of
-from tests.reference.torque_free import TorqueFreeBody
 
 Floats = NDArray[np.float64]
 Moved = Callable[[Scene, float], tuple[Floats, Floats, Floats]]
@@ -56,31 +55,6 @@ def axes_of(quaternions: Floats) -> Floats:
 
 # --- torque-free motion
 # ------------------------------------------------------------------------------------------
-@both
-@pytest.mark.parametrize(("spin", "duration"), [(10.0, 0.5), (1000.0, 0.02)])
-def test_an_asymmetric_top_turns_as_elliptic_functions_say(
-    moved: Moved, spin: float, duration: float
-) -> None:
-    """Landau and Lifshitz, Mechanics, section 37: body rates by cn, sn, dn; turning about the
-    momentum by a quadrature.
-
-    The truth's integrator errs by 1e-11 a step, the steps by rounding; an explicit bias errs by
-    1e-4 to 1 in a step.
-    """
-    body = TorqueFreeBody((1e-3, 2e-3, 2.8e-3), 0.3 * spin, 0.95 * spin)
-    moments = np.array(body.moments)
-    start = body.rates(0.0)
-    time, q, v = moved(
-        scene_of({"inertia": moments.tolist(), "velocity": [0, 0, 0, *start]}), duration
-    )
-    assert v[:, 3:] == pytest.approx(body.rates(time), abs=1e-9 * spin)
-    axes = axes_of(q[:, 3:])
-    momentum = moments * start / body.momentum
-    assert axes @ (moments * v[:, 3:])[:, :, None] / body.momentum == pytest.approx(
-        np.broadcast_to(momentum[:, None], (len(time), 3, 1)), abs=1e-9
-    )
-    turned = body.axes(0.0).T @ body.axes(float(time[-1]))
-    assert axes[0].T @ axes[-1] == pytest.approx(turned, abs=2e-7)
 
 
 @both
@@ -123,45 +97,6 @@ def test_floating_trees_that_turn_keep_momentum_and_energy() -> None:
 
 # --- with gravity and contact
 # -------------------------------------------------------------------------------------
-# kg m² about the centre of mass, m, rad, rad/s
-A = 2e-3
-C = 1e-3
-ARM = 0.05
-TILT = 0.4
-PRECESSION = 3.0
-
-
-@both
-def test_a_heavy_symmetric_top_precesses_steadily(moved: Moved) -> None:
-    """A' Ω² cos θ − C ω₃ Ω + m g l = 0 about the pivot, A' = A + m l²; L_z and L₃ are constant.
-
-    By steps, gravity acts at once in the middle of a step. Then the axis nutates by about the
-    square of the share of this momentum in that of the spin; L_z and L₃ are still exact.
-    """
-    pivot = A + ARM**2
-    spin = (pivot * PRECESSION**2 * np.cos(TILT) + G * ARM) / (C * PRECESSION)
-    turning = [
-        0.0,
-        PRECESSION * np.sin(TILT),
-        spin,
-    ]  # axes turned about x: the vertical is (0, sin θ, cos θ)
-    top = {
-        "joint": "spherical",
-        "inertia": [A, A, C],
-        "center_of_mass": [0, 0, ARM],
-        "velocity": turning,
-        "position": [np.sin(TILT / 2), 0.0, 0.0, np.cos(TILT / 2)],
-    }
-    time, q, v = moved(scene_of(top, gravity=G), 0.5)
-    axes = axes_of(q)
-    upward = np.einsum("nij,nj->ni", axes, np.array([pivot, pivot, C]) * v)[:, 2]
-    assert upward == pytest.approx(upward[0], rel=1e-9) and v[:, 2] == pytest.approx(spin, rel=1e-9)
-    energy = 0.5 * v**2 @ [pivot, pivot, C] + G * ARM * axes[:, 2, 2]
-    size = (2.0 * G * ARM * 1e-3 / (C * spin)) ** 2 if moved is by_steps else 1e-9  # 3e-5
-    assert np.abs(energy - energy[0]).max() <= size * G * ARM
-    assert np.arccos(axes[:, 2, 2]) == pytest.approx(TILT, abs=size)
-    around = np.unwrap(np.arctan2(axes[:, 1, 2], axes[:, 0, 2]))
-    assert around - around[0] == pytest.approx(PRECESSION * time, abs=size)
 
 
 RADIUS = 0.0285

@@ -145,30 +145,10 @@ def plate(K: list[float], B: list[float], **more: Any) -> Scene:
     return scene_of([body], WALL, [-2.0, 0, 0], gains, damping=[1.0, 1.0, 1e-3], **more)
 
 
-def arm(K: float, B: float, **more: Any) -> Scene:
-    def link(name: str, **placed: Any) -> dict[str, Any]:
-        shape = {"kind": "box", "size": [0.12, 0.02], "center": [0.06, 0]}
-        body = {"name": name, "joint": "revolute", "mass": 0.3, "inertia": 4e-4}
-        return body | {"center_of_mass": [0.06, 0], "shapes": [shape], **placed}
-
-    links = [
-        link("upper", position=[0.8]),
-        link("lower", parent="upper", origin=[0.12, 0], position=[-1.2]),
-    ]
-    wall = {"name": "wall", "kind": "half_plane", "point": [0, -0.02], "normal": [0, 1]}
-    gains = {"four_channel": {"stiffness": [K] * 2, "damping": [B] * 2}}
-    return scene_of(links, wall, [0, -1.0, 0], gains, point=[0.12, 0], damping=[0.01] * 2, **more)
-
-
 SOFT = {"forces": "paper", "stiffness": 1000.0, "damping": 20.0}
 GROWING: dict[str, tuple[Scene, str, dict[str, Any]]] = {  # scene, what is said, what helps
     # too long a delay
     "delayed": (slider(3000, 10, mass=0.3, delay=10), "10 steps", {"device.delay": 1}),
-    "both": (
-        slider(500, 20, rate=2000, delay=8),
-        "while tool and wall touch",
-        {"couplings.four_channel": {"stiffness": [140.0], "damping": [5.8]}},
-    ),
     "coupler": (
         slider(2000, 10, kind="unilateral", mass=0.2, delay=5),
         "unilateral",
@@ -180,18 +160,10 @@ GROWING: dict[str, tuple[Scene, str, dict[str, Any]]] = {  # scene, what is said
         {"device.delay": 3},
     ),
     "plate": (plate([800, 800, 0.2], [8, 8, 2e-3], delay=8), "plate and wall", {"device.delay": 4}),
-    "arm": (arm(20, 0.1, delay=8), "tool and device", {"device.delay": 1}),
-    "limited": (slider(1500, 10, delay=6, force_limit=[5.0]), "6 steps", {"device.delay": 1}),
-    # too much stiffness or damping for the step
     "damping": (
         slider(100, 250, mass=0.2),
         "B Δt/(m/2) = 2.5",
         {"couplings.four_channel.damping": [130.0]},
-    ),
-    "stiffness": (
-        slider(2.5e5, 1, damping=[0.0]),
-        "in free motion",
-        {"couplings.four_channel.stiffness": [1.3e5]},
     ),
     "damped turn": (
         plate([100, 100, 0.5], [10, 10, 0.3]),

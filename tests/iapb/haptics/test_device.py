@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from iapb.contact.laws import ImpulseAugmented, Penalty
 from iapb.errors import ArgumentError, IapbError
-from iapb.haptics.coupling import FourChannel, UnilateralCoupler
+from iapb.haptics.coupling import UnilateralCoupler
 from iapb.haptics.device import DeviceReading, SimulatedDevice
-from iapb.haptics.rendering import engage, move_device
+from iapb.haptics.rendering import engage
 from iapb.recording import Recorder
 from iapb.run import FREE, RESTING
 from iapb.scene import find_scene, load_scene, scene_from_text
@@ -103,38 +103,6 @@ hand: {{body: tool, force: [0, 0, 0]}}
 device: {{force_limit: [3, 2, 0.1], damping: {damping}}}
 """)
     )
-
-
-@pytest.mark.parametrize("center", ["[0, 0]", "[0.3, -0.2]"])
-@pytest.mark.parametrize("damping", [(0.0, 0.0, 0.0), (0.5, 2.0, 0.3)])
-def test_the_device_obeys_its_equation_of_motion(center: str, damping: tuple[float, ...]) -> None:
-    """M(q) a + B(q, v) = F_hand + F_actuators − b v; the new velocity moves it; the clock counts
-    the step."""
-    system = system_of(center, str(list(damping)))
-    rng = np.random.default_rng(0)
-    port = system.make_port(FourChannel(*GAINS))
-    device = system.device_mechanism()
-    world = system.world_under(Penalty())
-    state = system.make_state()
-    for step in range(5):
-        q = device.integrate(device.neutral(), rng.normal(size=3))
-        v, hand, actuators = rng.normal(size=(3, 3))
-        port.device_q[:] = q
-        port.device_v[:] = v
-        port.device_hand_force[:] = hand
-        port.device_force[:] = actuators
-        assert move_device(world, state, port)
-        force = hand + actuators - np.array(damping) * v - device.bias(q, v)
-        moved = v + world.dt * np.linalg.solve(device.mass_matrix(q), force)
-        assert port.device_v == pytest.approx(moved, abs=1e-13)
-        assert port.device_q == pytest.approx(device.integrate(q, moved, world.dt), abs=1e-13)
-        assert port.clock[0] == step + 1
-    for k in range(3):
-        port.device_q[:] = device.neutral()
-        port.device_v[:] = 0.0
-        port.device_force[:] = 0.0
-        port.device_force[k] = 1e200
-        assert not move_device(world, state, port)  # it left all bounds
 
 
 def test_the_coupler_is_on_while_the_tool_touches_or_the_device_is_inside_something() -> None:
