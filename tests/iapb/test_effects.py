@@ -56,7 +56,6 @@ SLIDER = [{"name": "cart", "joint": "prismatic", "axis": [1, 0], "mass": 1}]
 # law ignores
 CHOSEN: list[tuple[str, Scene, tuple[Any, ...], bool, str, str]] = [
     ("impulses", PEG, (Penalty(),), False, "'penalty' does not use it", "restitution"),
-    ("impulses", PEG, (RIGID,), False, f"'{RIGID.name}' does not use it", ""),
     *(
         (name, ROUGH, (law,), on, "contact." if on else RIGID.name, "" if on else field)
         for name, field in (
@@ -66,12 +65,10 @@ CHOSEN: list[tuple[str, Scene, tuple[Any, ...], bool, str, str]] = [
         )
         for law, on in (("penalty", True), (RIGID, False))
     ),
-    ("friction", PEG.with_values({"contact.friction": 0.0}), (RIGID,), False, RIGID.name, ""),
     *(
         (name, JOINTED, (DRIFTING,), False, "'drifting' does not use it", name)
         for name in ("joint_damping", "joint_limits")
     ),
-    ("impact_friction", ROUGH, (RUBBING,), True, "0.3", ""),
     ("impact_friction", PER_BODY, (RUBBING,), False, "per_body", ""),
     *(
         (name, PEG, (None, "none"), False, "no coupling", "")
@@ -85,18 +82,8 @@ CHOSEN: list[tuple[str, Scene, tuple[Any, ...], bool, str, str]] = [
         "four-channel",
         "",
     ),
-    (
-        "coupling",
-        PEG.with_values({"couplings.unilateral": None}),
-        (None, "unilateral"),
-        False,
-        "couplings.unilateral",
-        "",
-    ),
     ("coupling", BARE, (None, "four-channel"), False, "couplings.four_channel", ""),
     ("coupling", BARE, (None, GAINS), True, "[5, 6, 7]", ""),
-    ("device_limits", PEG, (None, "four-channel", "full"), False, "'full'", ""),
-    ("device_limits", PEG, (None, "four-channel", "scale"), True, "'scale'", ""),
     (
         "gravity",
         PENDULUM.with_values({"bodies": SLIDER}),

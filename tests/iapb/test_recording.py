@@ -74,6 +74,7 @@ def test_a_thinned_run_keeps_every_nth_step_and_those_with_an_impact(name, coupl
     scene = load_scene(find_scene(name))
     coupled = coupling_of(scene, coupling)
     whole = simulate(scene, coupling=coupled, steps=1400)
+    monkeypatch.setattr(recording, "_STEPS_PER_CHUNK", 90)
     monkeypatch.setattr(recording, "_PIECE", 1)  # each chunk is a piece
     thin = simulate(scene, coupling=coupled, steps=1400, every=7)
     kept = np.array([k for k in range(1400) if k % 7 == 0 or k in whole.impacts.step])

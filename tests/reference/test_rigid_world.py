@@ -29,7 +29,7 @@ from reference.rigid_step import (
     velocity_bounds,
 )
 from reference.time_stepping import RigidConstraints
-from reference.worlds import WORLDS, find_world, run_world
+from reference.worlds import find_world, run_world
 from tests.reference.scenes import scene_of
 
 DT = 1.0 / 512
@@ -344,21 +344,6 @@ def test_too_many_are_refused_before_the_first_step(monkeypatch: pytest.MonkeyPa
 
 
 PEG = load_scene(find_scene("peg_corner"))
-
-
-@pytest.mark.parametrize("name", [name for name in WORLDS if name != "mujoco"])
-def test_a_world_is_a_law_and_a_coupling_with_the_scenes_gains(name: str) -> None:
-    world = find_world(name)
-    coupling = world.coupling_in(PEG)
-    assert coupling.name == ("unilateral" if name == "CBuc" else "four-channel")
-    gains = getattr(PEG.couplings, coupling.name.replace("-", "_"))
-    assert coupling.settings == {"stiffness": list(gains.stiffness), "damping": list(gains.damping)}
-    run = run_world(PEG, name, steps=60)
-    parts = simulate(PEG, world.law, coupling, steps=60)
-    assert run.world == name and run.complete
-    assert np.array_equal(run.q, parts.q) and np.array_equal(run.device_q, parts.device_q)
-    assert world.coupling_in(load_scene(find_scene("two_discs"))).name == "none"
-    assert world.coupling_in(PEG.with_values({"couplings": {}})).name == "none"
 
 
 @pytest.mark.parametrize(

@@ -134,20 +134,6 @@ def test_a_wrong_limit_or_damping_is_refused_by_name(load: Load, inside: str, na
     assert named in refusal(load, PALM, FINGER, joint("slide", "finger", inside=inside))
 
 
-def test_the_limits_of_a_continuous_or_fixed_joint_are_remarked_and_ignored(load: Load) -> None:
-    scene = load(
-        PALM,
-        FINGER,
-        link("cap"),
-        joint("turn", "finger", "continuous", RANGE),
-        joint("weld", "cap", "fixed", RANGE + '<dynamics damping="1"/>'),
-    )
-    assert [body.joint_limits for body in scene.bodies] == [None] * 3
-    (said,) = scene.remarks
-    for what in ("of continuous joints (1)", "<limit> of fixed joints (1)", "<dynamics> of fixed"):
-        assert what in said
-
-
 # damping
 
 
@@ -370,14 +356,6 @@ def test_a_joint_that_moves_no_mass_is_named(said: str, bodies: list[str]) -> No
     assert mistake.line == 5 + len(bodies) and "default" not in mistake.value
 
 
-def test_a_massless_link_of_a_robot_is_named_with_its_joint(load: Load) -> None:
-    said = refusal(load, PALM, link("finger", 0.0), SLIDE)
-    assert "link 'finger', joint 'slide'" in said and "no mass moves along it" in said
-    assert "bodies[" not in said and "default" not in said
-    tool = f"bodies: [{{name: box, joint: free_flyer, {SOLID}}}]"
-    assert "bodies[" not in refusal(load, PALM, link("finger", 0.0), SLIDE, bodies=tool)
-
-
 # planar joints
 
 
@@ -395,18 +373,3 @@ def test_a_planar_joint_moves_across_its_axis(load: Load, axis: str) -> None:
     assert np.trace(R[-1]) == pytest.approx(1.0 + 2.0 * np.cos(0.5))
     R, p = mechanism.placements(mechanism.neutral())
     np.testing.assert_allclose(R[-1], np.eye(3), atol=1e-15)
-
-
-@pytest.mark.parametrize("rpy", [[1.0, 0.5, 0.0]])
-def test_a_turned_planar_base_moves_as_one_that_is_not_turned(rpy: list[float]) -> None:
-    """Without gravity: the links that it carries have the same joint angles, and energy stays."""
-    bodies = [
-        f"{{name: a, joint: planar, rpy: RPY, velocity: [0.3, -0.2, 1.0], {SOLID}}}",
-        "{name: b, parent: a, joint: revolute, axis: [0, 0, 1], origin: [0.4, 0, 0], mass: 1, "
-        "inertia: [0.1, 0.2, 0.2], center_of_mass: [0.3, 0, 0], velocity: [-3]}",
-    ]
-    text = YAML.replace("0.01", "1") + "".join(f"  - {body}\n" for body in bodies)
-    turned, plain = (
-        simulate(scene_from_text(text.replace("RPY", str(value)))) for value in (rpy, [0.0] * 3)
-    )
-    np.testing.assert_allclose(turned.q, plain.q, atol=1e-12)

@@ -19,14 +19,10 @@ from verification.complementarity import convergence as study
 
 BY_SCENE = {case.scene: case for case in study.CASES}
 EVENTS = {
-    "two_link_arm_a": 1,
     "peg_corner": 3,
-    "peg_hole": 1,
     "bernoulli_balls": 1,
     "arm_pushing": 1,
-    "ball_dropped_in_space": 1,
     "box_dropped_in_space": 2,
-    "cradle_in_space": 2,
     "arm_meets_a_wall_in_space": 1,
 }
 
@@ -62,16 +58,17 @@ class _Halved(RigidConstraints):
         return result._replace(v=0.5 * (before + result.v))
 
 
-@pytest.mark.parametrize("case", study.CASES, ids=lambda case: case.scene)
-def test_a_truth_does_not_depend_on_rounding(case: study.TruthCase) -> None:
+@pytest.mark.parametrize("name", study.QUICK)
+def test_a_truth_does_not_depend_on_rounding(name: str) -> None:
     """Starts that differ by 1e-14 to 1e-12 have the same events and stay within the bound that the
     truth states.
 
     With the contacts' forces taken one by one, these starts gave bernoulli_balls 1, 6 or more than
     60 events.
     """
-    scene = study.scene_of(case.scene)
-    truth = truth_of(case.scene)
+    case = BY_SCENE[name]
+    scene = study.scene_of(name)
+    truth = truth_of(name)
     start = System(scene).make_state()
     time = np.linspace(0.0, case.duration, 101)
     rng = np.random.default_rng(0)

@@ -44,23 +44,7 @@ def makes_stale_jacobian() -> Resolver:
 # name -> the law that must detect it, and how to make it
 BUGS: dict[str, tuple[str, Callable[[], Resolver]]] = {
     "reversed velocity": ("impulse_range", lambda: reversed_velocity),
-    "drops separating rows": (
-        "restitution",
-        lambda: lambda M, J, v, e: sound_resolver(M, J[J @ v < 0.0], v, e),
-    ),
     "printed formula": ("kinetic_energy", lambda: gram_pinv),
-    "single precision": (
-        "restitution",
-        lambda: lambda *given: sound_resolver(*given).astype(np.float32).astype(float),
-    ),
-    "fails without contacts": (
-        "kinetic_energy",
-        lambda: lambda M, J, v, e: sound_resolver(M, J, v, e) + 0.0 * np.max(np.abs(J)),
-    ),
-    "NaN without contacts": (
-        "kinetic_energy",
-        lambda: lambda M, J, v, e: sound_resolver(M, J, v, e) if len(J) else v + np.nan,
-    ),
     "stale Jacobian": ("restitution", makes_stale_jacobian),
     "returns too much": ("kinetic_energy", lambda: returns_too_much),
 }
@@ -159,13 +143,6 @@ def _weak_friction(M: Floats, J: Floats, T: Floats, v: Floats, e: float, mu: Flo
     return _struck(M, J, T, v, (1.0 + e) * p, (1.0 + e) * share[:, None] * p_t)
 
 
-def friction_of_one_alone(
-    M: Floats, J: Floats, T: Floats, v: Floats, e: float, mu: Floats
-) -> Floats:
-    """Drops friction if there is more than one contact."""
-    return moreau(M, J, T, v, e, mu if len(J) == 1 else 0.0 * mu)
-
-
 def _makes_stale_friction() -> Callable[..., Floats]:
     """Returns a resolver that knows an impact by all but μ."""
     known: dict[Any, Floats] = {}
@@ -201,10 +178,6 @@ PUSHING: dict[tuple[str, str], tuple[str, Callable[..., Any]]] = {
         "mixed_restitution",
         lambda M, J, v, e: newton(M, J, v, 0.0 if np.any(J @ v > 0.0) else e),
     ),
-    ("unilateral", "slow contacts ignored"): (
-        "restitution",
-        lambda M, J, v, e: newton(M, J[J @ v < -0.01], v, e),
-    ),
     ("frictional", "Newton and Coulomb"): ("kinetic_energy", _newton_and_coulomb),
     ("frictional", "friction pushes"): ("friction_opposes", _friction_pushes),
     ("frictional", "twice the friction"): (
@@ -216,9 +189,7 @@ PUSHING: dict[tuple[str, str], tuple[str, Callable[..., Any]]] = {
         "restitution",
         lambda M, J, T, v, e, mu: moreau(M, J, T, v, e * e, mu),
     ),
-    ("frictional", "pulls"): ("cone", lambda M, J, T, v, e, mu: sound_resolver(M, J, v, e)),
     ("frictional", "strikes what separates"): ("separating", _strikes_what_separates),
     ("frictional", "weak friction"): ("maximal_dissipation", _weak_friction),
-    ("frictional", "friction of one alone"): ("maximal_dissipation", friction_of_one_alone),
     ("frictional", "stale friction"): ("new_friction", _makes_stale_friction()),
 }

@@ -14,7 +14,7 @@ from verification.proofs.prove import checked
 from verification.proofs.statement import Statement
 from verification.proofs.steps import Known, Refused, Step, infer, prove
 from verification.proofs.steps import check as check_step
-from verification.proofs.words import Expression, Fact, Reader, letter, product
+from verification.proofs.words import Expression, Reader, letter, product
 
 NAMES = {
     "A": letter("A", "m", "n"),
@@ -154,50 +154,6 @@ def test_a_case_gives_its_letters_and_no_others(case: str) -> None:
 def test_what_is_no_formula_is_refused(formula: str) -> None:
     with pytest.raises(ArgumentError):
         FACT(formula) if re.search("[=⪰]", formula) else VALUE(formula)
-
-
-@pytest.mark.parametrize(
-    ("claim", "facts", "term", "why"),
-    [
-        ("−xᵀ x ≥ 0", "", "−1 xᵀ x", "no earlier step"),
-        ("−xᵀ x ≥ 0", "", "xᵀ x", "remain after"),
-        ("C C ⪰ 0", "C ⪰ 0", "C C", "no earlier step"),
-        ("Cᵀ C ⪰ 0", "C ≥ 0", "Cᵀ C", ""),
-        ("xᵀ C y ≥ 0", "C ≥ 0; x ≥ 0; y ≥ 0", "xᵀ C y", ""),
-        ("C C ⪰ 0", "C ≥ 0", "C C", "no earlier step"),
-        ("C ⪰ 0", "C ≥ 0", "C", "no earlier step"),
-        ("xᵀ C y ≥ 0", "C ≻ 0", "xᵀ C y", "no earlier step"),
-        ("s ≥ 0", "", "s", "no earlier step"),
-        ("s³ ≥ 0", "", "s³", "no earlier step"),
-        ("x ≥ 0", "", "x", "terms show"),
-        ("C ≻ 0", "C ≻ 0", "C", "terms show"),
-        ("s ≠ 0", "", "s", "terms show"),
-        ("s q = 0", "s ≥ 0; q ≥ 0", "s q", "terms show"),
-        ("s² ≥ 0", "", "s s", ""),
-    ],
-)
-def test_only_squares_pairings_and_known_forms_are_not_negative(
-    claim: str, facts: str, term: str, why: str
-) -> None:
-    known = Known([FACT(fact) for fact in facts.split(";") if fact])
-    terms = [tuple(x for x in each if isinstance(x, Expression)) for each in READER.products(term)]
-    if why:
-        with pytest.raises(Refused, match=why):
-            prove(FACT(claim), known, terms)
-    else:
-        prove(FACT(claim), known, terms)
-
-
-def test_a_fact_nobody_established_is_refused() -> None:
-    wanted: Fact = FACT("A B = I")
-    prove(FACT("A B A = A"), Known([wanted]))
-    for facts in ([], [FACT("A B = 2 I")]):
-        with pytest.raises(Refused):
-            prove(FACT("A B A = A"), Known(facts))
-        with pytest.raises(Refused, match="no earlier step proves"):
-            prove(FACT("A B A = A"), Known(facts), cofactors=[(VALUE("1"), wanted, VALUE("A"))])
-    with pytest.raises(Refused, match="remain"):
-        prove(FACT("B A = I"), Known([wanted]))
 
 
 @pytest.mark.parametrize(

@@ -172,20 +172,3 @@ def test_each_contact_reaches_the_solvers_with_its_own_restitution_and_friction(
     assert {*solved.column("friction")} == {"friction", "none"}
     paper = BALLS.with_values({"contact.forces": "paper"})
     assert "in 2 of 2 impacts" in compare_worlds(paper, ["IAPB"], "IAPB", impacts=4).answer
-
-
-def test_the_problems_of_a_rough_impact_have_normals_and_tangents():
-    smooth, rough, _, why = problems_of_run(run_world(DOOR, "IAPB"), DOOR)[0]
-    assert why == "" and smooth.friction is None  # forces: paper, so IAPB's impact has none
-    assert rough.friction.tolist() == [0.2] and rough.contact_size == 2
-    normal, tangent = rough.contact_jacobian
-    assert np.array_equal(normal, smooth.contact_jacobian[0])
-    # The ball moves by (x, y, turn): unit directions at right angles, and its radius along the
-    # tangent.
-    assert np.hypot(*tangent[1:3]) == pytest.approx(1.0) and tangent[1:3] @ normal[
-        1:3
-    ] == pytest.approx(0.0, abs=1e-12)
-    assert abs(tangent[3]) == pytest.approx(0.05) and normal[3] == pytest.approx(0.0, abs=1e-12)
-    assert not problems_of_run(
-        run_world(SLOPE, "IAPB"), SLOPE.with_values({"contact.friction": 0.0})
-    )
