@@ -1,6 +1,6 @@
 """What may not change a motion: the order and names of bodies and walls, a turn, a mirror, the place,
 the unit of length, a wall given twice or in two parts, a far body, the plane given as a part of
-space; and half the step, which may change it by what one step does.
+space.
 
 Each ordinary scene of free bodies is run once as it is and once changed. The change is undone on the
 final poses, and the largest difference is a share of the size of the motion.
@@ -320,31 +320,3 @@ def test_a_change_that_means_nothing_changes_nothing(
         plain[name] = run_of(values)
     changed = run_of(placed(how(values), place))
     assert difference(plain[name], changed, values, place) <= most
-
-
-def way_of(run: Run, values: Values) -> float:
-    """Return the way of the fastest point in one step [m], with what gravity adds in it."""
-    axes = 3 if values.get("dimensions") == 3 else 2
-    speeds = run.v.reshape(len(run.v), -1, 6 if axes == 3 else 3)
-    linear, angular = (np.linalg.norm(part, axis=2) for part in np.split(speeds, [axes], axis=2))
-    fastest = float((linear + size_of(values) * angular).max())
-    return (fastest + float(np.linalg.norm(values.get("gravity", 0.0))) * run.dt) * run.dt
-
-
-LATE = 4.0
-GROWTH = {"box_tips_over_edge": 9.0}  # of an error while the box passes its upright pose
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("name", SCENES)
-def test_half_the_step_changes_a_motion_by_what_a_step_may(
-    name: str, plain: dict[str, Run]
-) -> None:
-    """A method of order one: it finds a touch up to a step late, so the body is a step's way too far,
-    and leaves with up to twice its speed; friction stops it as late. So four ways of a step."""
-    values = CASES[name].scene
-    if name not in plain:
-        plain[name] = run_of(values)
-    finer = run_of(values | {"rate": 2.0 * values["rate"]})
-    most = LATE * GROWTH.get(name, 1.0) * way_of(plain[name], values) / size_of(values)
-    assert difference(plain[name], finer, values) <= most

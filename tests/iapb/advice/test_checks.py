@@ -239,19 +239,6 @@ def test_in_a_stack_all_contacts_swing_together() -> None:
 
 
 @pytest.mark.parametrize(
-    ("damping", "stiffness"), [(0.0, 1e5), (150.0, 1e4), (50.0, 1e4), (0.0, 2e6)]
-)
-def test_at_the_smallest_rate_the_scene_is_at_its_limits(damping: float, stiffness: float) -> None:
-    given = scene(box(), damping=damping, stiffness=stiffness)
-    limits = step_limits(Start(given))
-    assert limits is not None
-    there = step_limits(Start(given.with_values({"rate": limits.rate})))
-    assert there is not None
-    at_a_limit = (stiffness / there.stiffness, damping / there.damping if damping else 0.0)
-    assert max(at_a_limit) == pytest.approx(1.0, rel=1e-6)
-
-
-@pytest.mark.parametrize(
     ("moments", "kinds"),
     [([1e-3, 1e-3, 1e-2], ["inertia"]), ([1e-3, 1e-3, 2e-3], []), ([0.0, 1e-3, 1e-3], [])],
 )

@@ -82,23 +82,6 @@ def test_a_loop_grows_where_the_step_has_an_eigenvalue_outside_the_circle(d: int
     assert 10 < grown < 50  # both kinds were drawn
 
 
-@pytest.mark.parametrize(
-    ("K", "share", "grows"),
-    [(0.0, 0.999, False), (0.0, 1.001, True), (3e5, 0.999, False), (3e5, 1.001, True)],
-)
-def test_without_delay_the_limit_is_the_closed_form(K: float, share: float, grows: bool) -> None:
-    """K Δt² + 2 B Δt = 2 m, with K = 0 the condition B Δt/(m/2) < 2."""
-    m = 0.7
-    dt = 1e-3
-    zero = np.zeros((1, 1))
-    B = share * (2.0 * m - K * dt**2) / (2.0 * dt)
-    none = np.zeros(1)
-    loop = HapticLoop(
-        m * np.eye(1), np.array([K]), np.array([B]), none, none, 0, dt, zero, zero, True, True
-    )
-    assert loop.grows == grows
-
-
 # Scenes
 
 WALL = {"name": "wall", "kind": "half_plane", "point": [0, 0], "normal": [1, 0]}

@@ -256,19 +256,11 @@ def test_a_flat_face_on_a_face_keeps_its_points_and_names_whichever_rounding_tak
         place = [0.05, 0.03, 0.0999, tilt / 2] if space else [0.05, 0.0999, tilt]
         q = at_places(system, place, [0.0] * len(place))
         found = system.contacts_at(q)
-        low = -0.05 * np.ones(2) + [0.0, -0.02]
-        high = 0.15 * np.ones(2) + [0.0, -0.02]
-        expected = (
-            [[x, y] for x in (low[0], high[0]) for y in (low[1], high[1])]
-            if space
-            else [[-0.05], [0.15]]
-        )
-        if top == large:  # the lower one is the small box, about the origin
-            expected = (
-                [[x, y] for x in (-0.1, 0.1) for y in (-0.1, 0.1)] if space else [[-0.1], [0.1]]
-            )
-        got = sorted(found.point[:, : len(expected[0])].round(9).tolist())
-        np.testing.assert_allclose(got, sorted(expected), atol=1e-9)
+        middle = np.array(place[:2] if top == small else [0.0, 0.0])  # of the small box
+        corners = [middle + (x, y) for x in (-0.1, 0.1) for y in (-0.1, 0.1)][:: 1 if space else 2]
+        axes = 2 if space else 1
+        got = sorted(found.point[:, :axes].round(9).tolist())
+        np.testing.assert_allclose(got, [corner[:axes] for corner in corners], atol=1e-9)
         np.testing.assert_allclose(found.gap, -1e-4, atol=1e-9)
         level = system.contacts_at(at_places(system, place[:-1] + [0.0], [0.0] * len(place)))
         assert sorted(level.feature.tolist()) == sorted(found.feature.tolist())

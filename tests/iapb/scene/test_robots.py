@@ -134,20 +134,6 @@ def test_a_wrong_limit_or_damping_is_refused_by_name(load: Load, inside: str, na
     assert named in refusal(load, PALM, FINGER, joint("slide", "finger", inside=inside))
 
 
-# damping
-
-
-def test_damping_is_that_of_the_same_scene_in_yaml(load: Load) -> None:
-    """Terminal speed m g / d; the run has the bits of a scene that says joint_damping itself."""
-    scene = load(PALM, FINGER, joint("slide", "finger", inside='<dynamics damping="5"/>'))
-    plain = load(PALM, FINGER, joint("slide", "finger")).with_values(
-        {"bodies.r_finger.joint_damping": 5.0}
-    )
-    run = simulate(scene)
-    assert (run.q[-1, 0] - run.q[-2, 0]) / run.dt == pytest.approx(-0.1 * 9.81 / 5.0, rel=1e-9)
-    assert np.array_equal(run.q, simulate(plain).q)
-
-
 # mimic and friction
 
 
@@ -158,14 +144,18 @@ def follower(mimic: str, inside: str = RANGE, kind: str = "prismatic") -> str:
 THUMB = link("thumb")
 
 
-def test_a_gripper_closes_as_one(load: Load) -> None:
-    """The second finger follows the first; its weight holds the other one's, and its limit stops it."""
-    scene = load(PALM, FINGER, THUMB, SLIDE, follower('joint="slide" multiplier="-1"'))
-    assert mechanism_of(scene).nv == 1 and scene.bodies[1].position == ()
-    assert np.abs(simulate(scene).q).max() < 1e-12
-    heavy = scene.with_values({"bodies.r_thumb.mass": 0.5})  # it falls, and lifts the first one
-    run = simulate(heavy)
-    assert run.q[-1, 0] == pytest.approx(0.02, abs=1e-4) and not run.distrust
+def test_what_a_joint_has_in_the_file_its_body_has(load: Load) -> None:
+    slide = joint("slide", "finger", inside=RANGE + '<dynamics damping="5" friction="1"/>')
+    parts = PALM, FINGER, THUMB, slide, follower('joint="slide" multiplier="-1"')
+    scene = load(*parts)
+    bodies = {body.name: body for body in scene.bodies}
+    finger = bodies["r_finger"]
+    assert (finger.joint_damping, finger.joint_friction) == ((5.0,), (1.0,))
+    mimic = bodies["r_thumb"].joint_mimic
+    assert (mimic.body, mimic.multiplier, mimic.offset) == ("r_finger", -1.0, 0.0)
+    assert mechanism_of(scene).nv == 1
+    left = {body.name: body for body in load(*parts, more="leave_out: {slide: [dynamics]}").bodies}
+    assert not left["r_finger"].joint_damping and not left["r_finger"].joint_friction
 
 
 @pytest.mark.parametrize(
@@ -202,15 +192,6 @@ def test_a_start_follows_the_leader_and_stays_within_both_ranges(load: Load) -> 
         assert "range in common" in refusal(load, *parts, other)
     with pytest.raises(ArgumentError, match="of what follows it"):
         simulate(scene.with_values({"bodies.r_thumb.joint_mimic.offset": 0.1}))
-
-
-def test_friction_of_a_joint_holds_a_light_finger(load: Load) -> None:
-    slide = joint("slide", "finger", inside='<dynamics friction="1"/>')
-    scene = load(PALM, FINGER, slide)
-    assert scene.bodies[1].joint_friction == (1.0,)
-    assert np.abs(simulate(scene).q).max() < 1e-9
-    left = load(PALM, FINGER, slide, more="leave_out: {slide: [dynamics]}")
-    assert simulate(left).q.min() < -1.0
 
 
 # what is ignored is said, once

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from iapb import resolve_impact
-from reference.exact import bulk_energy_gain, relative_energy_gain
+from reference.exact import relative_energy_gain
 from verification.certificate import judge_gains
 from verification.finding import NOT_TESTABLE, REFUTED, REPRODUCED
-from verification.impacts import ADVERSE_FAMILIES, ANY_RANK, EPS, Impacts, draw_impacts
+from verification.impacts import ADVERSE_FAMILIES, ANY_RANK, Impacts, draw_impacts
 from verification.laws import ImpactCase, bulk
 from verification.laws.bounds import FACTORED
 from verification.laws.bulk import GAIN, NO_CLAMP, PRINTED, SHARE, TABLE, by_engine, judged_impacts
@@ -41,12 +41,6 @@ def test_impacts_of_any_rank_never_gain_and_other_methods_do() -> None:
     assert found[SHARE] > 1e3
 
 
-def test_the_same_seed_gives_the_same_row() -> None:
-    first = judged_impacts(ANY_RANK, 300, PRINTED, seed=4)
-    assert first == judged_impacts(ANY_RANK, 300, PRINTED, seed=4)
-    assert first != judged_impacts(ANY_RANK, 300, PRINTED, seed=5)
-
-
 def test_impacts_of_any_rank_have_all_sizes_and_are_often_redundant() -> None:
     rng = np.random.default_rng(1)
     redundant = 0
@@ -71,17 +65,6 @@ def test_without_the_last_step_the_judge_finds_gains(family: str) -> None:
     given = draw_impacts(np.random.default_rng(1), family, 2000, 4, 3)
     bare = by_engine(given, scale=False, clamped=False)[0]
     assert judge_gains(given.mass, given.v, bare).gained.sum() > 50
-
-
-@pytest.mark.parametrize("family", ADVERSE_FAMILIES[:4])
-def test_passivity_costs_at_most_one_rounding(family: str) -> None:
-    """The energy that elastic impacts lose beyond what rounding loses without the last step."""
-    given = draw_impacts(np.random.default_rng(2), family, 1000, 4, 3)
-    elastic = given.restitution == 1.0
-    bound = 10.0 * 4 * EPS * np.sqrt(given.condition)
-    kept, bare = (by_engine(given, False, clamped)[0] for clamped in (True, False))
-    lost, free = (-bulk_energy_gain(given.mass, given.v, v_plus)[0] for v_plus in (kept, bare))
-    assert ((lost - np.maximum(free, 0.0)) / bound)[elastic].max() <= 1.0
 
 
 def test_a_family_whose_impacts_do_not_move_is_not_reproduced(

@@ -4,12 +4,8 @@ names."""
 from __future__ import annotations
 
 import ctypes
-import subprocess
-import sys
-import time
 from collections.abc import Callable
 from itertools import count
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,7 +15,7 @@ from iapb.errors import ArgumentError
 from tests.verification.laws.faults import makes_stale_jacobian
 from verification import check_passivity
 from verification.impacts import Floats
-from verification.laws import LAWS, ImpactCase, PassivityReport, sound_resolver
+from verification.laws import LAWS, ImpactCase, sound_resolver
 from verification.laws.bounds import KIT
 from verification.laws.child import Child
 from verification.laws.planted import makes_stale_answers, makes_warm_start
@@ -30,13 +26,6 @@ def makes_counter() -> Callable[..., Floats]:
     """Returns a resolver whose every fiftieth answer is a tenth too fast."""
     number = count(1)
     return lambda *given: sound_resolver(*given) * (1.1 if next(number) % 50 == 0 else 1.0)
-
-
-def gains_or_raises(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Gains energy with two contacts, and needs one."""
-    if not len(J):
-        raise ValueError("no contacts")
-    return sound_resolver(M, J, v, e) * (1.5 if len(J) == 2 else 1.0)
 
 
 def hangs(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
@@ -68,18 +57,6 @@ def test_what_depends_on_earlier_calls_is_printed_with_them(make: Callable[[], A
         assert residual is not None and residual.passed
 
 
-@pytest.mark.thorough
-def test_a_wrong_answer_and_no_answer_are_both_shown() -> None:
-    report = check_passivity(gains_or_raises, impacts=30, search=0)
-    gains, raises = report.found
-    assert (gains.law, gains.case.contacts, gains.fault) == ("kinetic_energy", 2, "")
-    assert raises.case.contacts == 0 and raises.fault == "raised ValueError: no contacts"
-    with pytest.raises(AssertionError, match="kinetic_energy"):
-        run(report.test_of(gains), gains.law, gains_or_raises)
-    with pytest.raises(ResolverFault, match="no contacts"):
-        run(report.test_of(raises), raises.law, gains_or_raises)
-
-
 @pytest.mark.parametrize(
     ("law", "contract"), [("elastic", "equality"), ("separating", "unilateral")]
 )
@@ -109,21 +86,6 @@ def test_a_call_that_never_returns_is_ended(fault: Callable[..., Any], words: st
             run(report.counterexample_test, "kinetic_energy", hangs)
 
 
-@pytest.mark.thorough
-def test_a_call_that_hangs_is_named_while_it_does(capfd: pytest.CaptureFixture[str]) -> None:
-    asleep = [True]
-
-    def sleeps(*given: Any) -> Floats:
-        if asleep.pop() if asleep else False:
-            time.sleep(4.0)
-        return sound_resolver(*given)
-
-    assert check_passivity(sleeps, impacts=2, search=0, call_limit=1.0).passed
-    told = capfd.readouterr().err
-    assert "sleeps has given no answer for 1 s. The impact:\n  M = [[" in told
-    assert told.count("The impact") == 1
-
-
 def test_a_child_is_the_resolver_and_starts_anew() -> None:
     def counts(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
         calls.append(e)
@@ -148,17 +110,3 @@ def test_no_process_of_its_own_where_none_can_be_forked(monkeypatch: pytest.Monk
         check_passivity(sound_resolver, impacts=1, own_process=True)
     report = check_passivity(makes_counter(), impacts=20, search=0)
     assert report.found[0].fresh is None and not report.passed
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("make", ["makes_counter", "makes_stale_answers"])
-def test_a_printed_test_fails_in_a_fresh_process(make: str, tmp_path: Path) -> None:
-    report: PassivityReport = check_passivity(globals()[make](), impacts=60, search=20)
-    module = "test_counterexamples" if make == "makes_counter" else "planted"
-    package = "tests.verification.laws" if make == "makes_counter" else "verification.laws"
-    file = tmp_path / "test_pasted.py"
-    given = f"from {package}.{module} import {make}\n\nresolver = {make}()\n"
-    file.write_text(f"{given}\n{report.counterexample_test}\n")
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(file)]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 1 and "1 failed" in done.stdout and "AssertionError" in done.stdout

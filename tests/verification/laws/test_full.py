@@ -7,27 +7,11 @@ import numpy as np
 import pytest
 
 from iapb import resolve_impact
-from verification.impacts import Floats, ImpactCase
+from verification.impacts import Floats
 from verification.laws import full as study
-from verification.laws.bounds import FACTORED, KIT
+from verification.laws.bounds import FACTORED
 from verification.laws.equality import LAWS, UNEQUAL_LAWS
 from verification.laws.planted import wrong_sign
-from verification.laws.resolver import own_outcome, sound_resolver
-
-
-def test_the_laws_of_one_call_ask_once_and_keep_a_copy() -> None:
-    case = ImpactCase(np.eye(2), np.array([[1.0, 0.0]]), np.array([-1.0, 1.0]), 0.5)
-    answers: list[Floats] = []
-
-    def counting(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-        answers.append(sound_resolver(M, J, v, e))
-        return answers[-1]
-
-    for name in study.OF_ONE_CALL:
-        assert LAWS[name].check(case, counting, KIT).passed
-    assert len(answers) == 1
-    answers[0][:] = 7.0
-    assert own_outcome(counting, case)[0] == 0.5 != own_outcome(wrong_sign, case)[0]
 
 
 @pytest.mark.parametrize(("part", "laws"), [(study.IMPACTS, LAWS), (study.UNEQUAL, UNEQUAL_LAWS)])
