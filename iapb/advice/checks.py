@@ -36,7 +36,6 @@ Rows = Integers  # numbers of contacts
 
 NEAR = 0.02  # of the smaller shape: contacts closer than this at the start count as touching
 DEEP = 0.02  # of the smaller shape: a larger overlap at the start is more than a resting depth
-SHIFTED = 0.05  # of the smaller shape: distance by which friction in an impact may displace a body
 SAG = 0.1  # of the smaller shape, or of a joint's range: largest static sag of a rigid contact
 THROWN = 1.0  # largest k = K Δt²/m at which a new contact returns no more energy than it absorbs
 ROUNDED = 1e-9  # relative rounding error of a limit
@@ -441,9 +440,6 @@ def check_scene(
                 f"{integrator}: set integrator: momentum, or contact.forces: paper",
             )
         )
-    frictionless = laws.IMPULSES in uses and laws.IMPACT_FRICTION not in uses
-    if frictionless and scene.contact.self_collision_rows == "relative":
-        found += _slips_through_impacts(start)
     for name in ("four-channel", "unilateral") if scene.hand is not None else ():
         if coupling in (None, name) and getattr(scene.couplings, name.replace("-", "_")):
             found += _coupled(start, name)
@@ -592,64 +588,6 @@ def _fast(start: Start) -> Iterator[Caution]:
             f"sinks in or "
             f"passes through; set rate >= {_up(4.0 * speed / size):g} Hz, or impacts at the touch",
         )
-
-
-def _slips_through_impacts(start: Start) -> Iterator[Caution]:
-    """Warn of a free body that slides as it first lands, if friction in the impact would change its
-    path visibly."""
-    # Friction in the impact would reduce the slip by up to Δv = μ (1 + e) v_n. Without it, resting
-    # friction removes the same slip within Δv/(μ a), a the acceleration onto the wall; a bounce
-    # keeps it for a flight of 2 e v_n/a.
-    # tree -> time, contact
-    scene = start.scene
-    found = start.found
-    first = dict[int, tuple[float, int]]()
-    trees = start.mechanism.tree_of_body.tolist()
-    held = scene.hand.body if scene.hand is not None else ""
-    free = {
-        tree
-        for tree, body in zip(trees, scene.bodies, strict=True)
-        if trees.count(tree) == 1 and body.joint in ("planar", "free_flyer") and body.name != held
-    }
-    for i in (int(rows[0]) for rows in start.by_pair):
-        both = {int(start.tree_a[i]), int(start.tree_b[i])}
-        for tree in both if both <= free else ():
-            first[tree] = min(first.get(tree, (math.inf, i)), (float(start.meeting[0][i]), i))
-    worst = SHIFTED
-    said = list[Caution]()
-    for time, i in sorted(first.values()):
-        if time >= scene.duration or start.friction[i] == 0.0:
-            continue
-        speed = float(start.meeting[1][i])
-        mu = float(start.friction[i])
-        left = scene.duration - time
-        e = float(
-            mechanism.restitution_by_pair(scene, np.array([[found.shape_a[i], found.shape_b[i]]]))[
-                0
-            ]
-        )
-        slip = float(np.linalg.norm(start.slips(i) @ (start.v + time * start.fall)))
-        change = min(mu * (1.0 + e) * speed, slip)
-        force = -float(start.pull[i])
-        lasts = (
-            left
-            if force <= 0.0
-            else min(left, max(2.0 * e * speed / force, 0.5 * change / (mu * force)))
-        )
-        if change * lasts / float(start.thickness[i]) >= worst:
-            worst = change * lasts / float(start.thickness[i])
-            names = start.names([i])
-            said = [
-                Caution(
-                    "impact friction",
-                    names,
-                    f"{names} meet at {speed:.3g} m/s and slide at {slip:.3g} m/s, "
-                    f"and impacts of this law have no friction, which would take {change:.3g} m/s "
-                    f"of it: use "
-                    "the world IAPB-friction or ideal-friction",
-                )
-            ]
-    yield from said
 
 
 def _too_stiff(start: Start) -> Iterator[Caution]:
