@@ -144,6 +144,10 @@ class Simulation:
         """
         if hand_force is not None:
             self.hold(hand_force)
+        self._step()
+        return copied_step(self.system, self.state)
+
+    def _step(self) -> None:
         state = self.state
         port = self.port
         if self._planned:
@@ -158,7 +162,6 @@ class Simulation:
         if self.link is not None:
             self.link.exchange()
         self.steps_done += 1
-        return copied_step(self.system, self.state)
 
     def follow(self, q: Floats, v: Floats) -> Floats:
         """Move the device through readings (n, d) of its position and velocity, one a step; return
@@ -244,12 +247,12 @@ class Simulation:
                     f"{law} {what}", int(count), f"a count from 0 to {most}, the size of its buffer"
                 )
         vectors = {name: np.asarray(getattr(result, name)) for name in _STEP_VECTORS}
-        for name, values in vectors.items():
-            target = getattr(state, name)
-            if values.shape != target.shape or not np.all(np.isfinite(values)):
+        targets = [getattr(state, name) for name in _STEP_VECTORS]
+        for (name, values), target in zip(vectors.items(), targets, strict=True):
+            if values.shape != target.shape or not np.isfinite(values).all():
                 raise ArgumentError(f"{law} {name}", values, f"{len(target)} finite numbers")
-        for name, values in vectors.items():
-            getattr(state, name)[:] = values
+        for values, target in zip(vectors.values(), targets, strict=True):
+            target[:] = values
         tool = self.system.tool_tree
         state.state_of_tree[tool if tool >= 0 else slice(None)] = result.state
 
@@ -265,7 +268,7 @@ class Simulation:
             return done, IapbError(FAILURES[status]) if status else stop
         for k in range(steps):
             try:
-                self.step()
+                self._step()
             except (IapbError, KeyboardInterrupt) as stop:
                 return k, stop
             last = self.steps_done - 1

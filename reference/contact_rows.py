@@ -50,9 +50,10 @@ def find_rows(system: Any, q: Floats, v: Floats, margin: float) -> ContactRows:
     axes, origins, frames = mechanics_of(system).bodies(q)
     geometry = system.finder.find(axes, origins, margin)
     if (geometry.gap > 0.0).any():
-        solids = _solids_of(system).placed(axes, origins)
-        grazing = _grazing(geometry.shape_a, geometry.shape_b, geometry.gap, solids)
-        geometry = Contacts(*(column[~grazing] for column in geometry))
+        shapes = geometry.shape_a, geometry.shape_b
+        grazing = _grazing(*shapes, geometry.gap, _solids_of(system), axes, origins)
+        if grazing.any():
+            geometry = Contacts(*(column[~grazing] for column in geometry))
     if len(system.stops.bound):
         geometry = _with_stops(geometry, system, q, origins, frames, margin)
     rows = contact_jacobian(geometry.normal, geometry, origins, frames)
@@ -69,18 +70,7 @@ class _Solids(NamedTuple):
     offset: Floats  # (f,) [m] n·x of the points of a face
     corners: NDArray[np.int64]  # (n + 1,) the first corner of each shape
     faces: NDArray[np.int64]  # (n + 1,)
-    corner_body: NDArray[np.int64]  # (k,)
-    face_body: NDArray[np.int64]  # (f,)
-
-    def placed(self, axes: Floats, origins: Floats) -> _Solids:
-        """Return the shapes in the world, from the axes of their bodies."""
-        turned = np.einsum("nij,nj->ni", axes[self.corner_body], self.corner)
-        face = np.einsum("nij,nj->ni", axes[self.face_body], self.face)
-        return self._replace(
-            corner=turned + origins[self.corner_body],
-            face=face,
-            offset=self.offset + (face * origins[self.face_body]).sum(axis=1),
-        )
+    body: NDArray[np.int64]  # (n,)
 
 
 def _solids_of(system: Any) -> _Solids:
@@ -110,27 +100,37 @@ def _solids_of(system: Any) -> _Solids:
         np.concatenate(offset),
         np.cumsum([0, *corners]),
         np.cumsum([0, *faces]),
-        np.repeat(system.shapes.body, corners),
-        np.repeat(system.shapes.body, faces),
+        np.asarray(system.shapes.body, np.int64),
     )
     return _solids.setdefault(system.mechanism, made)
 
 
 @numba.njit(cache=True, fastmath=False)
-def _grazing(shape_a, shape_b, gap, solids):  # type: ignore[no-untyped-def]
-    """Return whether each contact (c,) is between shapes that graze."""
+def _turned(axes, vector):  # type: ignore[no-untyped-def]
+    turned = np.zeros(3)
+    for i in range(3):
+        for k in range(3):
+            turned[i] += axes[i, k] * vector[k]
+    return turned
+
+
+@numba.njit(cache=True, fastmath=False)
+def _grazing(shape_a, shape_b, gap, solids, axes, origins):  # type: ignore[no-untyped-def]
+    """Return whether each contact (c,) is between shapes that graze, at these places of the
+    bodies."""
     grazes = np.zeros(len(gap), np.bool_)
     for c in range(len(gap)):
         near = GRAZE * (solids.size[shape_a[c]] + solids.size[shape_b[c]])
         for side in range(2 if gap[c] > near else 0):
             one, other = (shape_a[c], shape_b[c]) if side == 0 else (shape_b[c], shape_a[c])
+            here = solids.body[one]
+            there = solids.body[other]
             for f in range(solids.faces[one], solids.faces[one + 1]):
+                face = _turned(axes[here], solids.face[f])
                 lowest = np.inf
                 for k in range(solids.corners[other], solids.corners[other + 1]):
-                    height = -solids.offset[f]
-                    for i in range(3):
-                        height += solids.corner[k, i] * solids.face[f, i]
-                    lowest = min(lowest, height)
+                    way = _turned(axes[there], solids.corner[k]) + origins[there] - origins[here]
+                    lowest = min(lowest, (way * face).sum() - solids.offset[f])
                 grazes[c] |= abs(lowest - solids.radius[other]) <= near
     return grazes
 
@@ -243,12 +243,24 @@ def unit_tangents(normals: Floats, spatial: bool) -> Floats:
     return np.stack([first, np.cross(normals, first)], axis=1)
 
 
-def lasting(state: Any, found: ContactRows) -> NDArray[np.bool_]:
-    """Return which contacts (c,) `state` has from the step before."""
-    names = ("shape_a", "shape_b", "feature")
-    before = int(state.contact_count[0])
-    old = {*zip(*(getattr(state.contacts, name)[:before].tolist() for name in names), strict=True)}
-    now = zip(*(getattr(found.geometry, name).tolist() for name in names), strict=True)
+def lasting(
+    contacts: Any, before: int, geometry: Contacts, kept: NDArray[Any] | slice
+) -> NDArray[np.bool_]:
+    """Return which of the `kept` contacts the step before had, the first `before` of `contacts`."""
+    old = {
+        *zip(
+            contacts.shape_a[:before].tolist(),
+            contacts.shape_b[:before].tolist(),
+            contacts.feature[:before].tolist(),
+            strict=True,
+        )
+    }
+    now = zip(
+        geometry.shape_a[kept].tolist(),
+        geometry.shape_b[kept].tolist(),
+        geometry.feature[kept].tolist(),
+        strict=True,
+    )
     return np.array([name in old for name in now], np.bool_)
 
 
@@ -261,21 +273,18 @@ def write_contacts(
     friction : (c, 3) tangential impulses in world axes, recorded as forces
     """
     into = state.contacts
-    geometry = found.geometry
     before = int(state.contact_count[0])
-    new = ~lasting(state, found)
     kept = np.flatnonzero(~(found.gap > 0.0) | (blow > 0.0) | (pushed > 0.0))
-    columns = {
-        **geometry._asdict(),
-        "normal_velocity": found.gamma,
-        "normal_force": pushed / dt,
-        "friction_force": friction / dt,
-    }
-    for name, column in columns.items():
-        getattr(into, name)[: len(kept)] = column[kept]
-    into.is_new[: len(kept)] = new[kept]
-    state.contact_impulse[: len(kept)] = blow[kept]
     state.contact_count[:] = len(kept), before
+    if not len(kept):
+        return
+    into.is_new[: len(kept)] = ~lasting(into, before, found.geometry, kept)
+    for name, column in zip(Contacts._fields, found.geometry, strict=True):
+        getattr(into, name)[: len(kept)] = column[kept]
+    into.normal_velocity[: len(kept)] = found.gamma[kept]
+    into.normal_force[: len(kept)] = pushed[kept] / dt
+    into.friction_force[: len(kept)] = friction[kept] / dt
+    state.contact_impulse[: len(kept)] = blow[kept]
 
 
 def write_impact(

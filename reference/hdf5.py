@@ -80,9 +80,15 @@ def dataset_at(group: Any, name: str, budget: Budget) -> Any:
     found = _item_at(group, name)
     if not isinstance(found, h5py.Dataset):
         raise ValueError(f"{name} is a group: expected a dataset")
-    _check_storage(found)
-    _check_size(found, budget)
+    check_dataset(found, budget)
     return found
+
+
+def check_dataset(dataset: Any, budget: Budget) -> None:
+    """Raise ValueError if the values of a dataset are not in its file, or its size is beyond its
+    bytes or the budget."""
+    _check_storage(dataset)
+    _check_size(dataset, budget)
 
 
 def values_at(group: Any, name: str, budget: Budget) -> Any:

@@ -62,6 +62,8 @@ CLOSED = 1e-12
 # Active sets cycle for some redundant rows, projections do not.
 STEP_SOLVERS = {"daqp": daqp, "quadprog": quadprog, "gauss_seidel": projected_sweeps}
 SCHEMES = ("automatic", "moreau", "stewart-trinkle")
+_AUTOMATIC = 0
+_STEWART = 2
 NEWTON = "Newton"
 POISSON = "Poisson"
 
@@ -177,7 +179,7 @@ def nearest_velocity(
     factor = _cholesky(mass_matrix)
     said = list[str]()
     rows = _whitened(factor, contact_jacobian[kept])
-    scale = float(np.max(np.abs(contact_jacobian[kept]) @ np.abs(v_free) + np.abs(bound[kept])))
+    scale = _scale(contact_jacobian, v_free, bound)
     for name, solver in STEP_SOLVERS.items():
         if name == "gauss_seidel" and "infeasible" in said[0]:
             break
@@ -186,12 +188,8 @@ def nearest_velocity(
         except SolverError as error:
             said.append(str(error))
             continue
-        # the largest |min(W_ii p_i, w_i)| [m/s] of 0 <= p ⟂ w = A Aᵀ p + offset >= 0, and the terms
-        # that cancel in w
-        natural = np.minimum(np.einsum("ij,ij->i", rows, rows) * p, rows @ (rows.T @ p) + offset)
-        residual = float(np.abs(natural).max(initial=0.0)) / scale
-        sizes = np.abs(rows)
-        cancelling = float((sizes @ (sizes.T @ np.abs(p))).max(initial=0.0))
+        natural, cancelling = _natural(rows, p, offset)
+        residual = natural / scale
         if residual <= max(STEP_TOLERANCE, STEP_ROUNDING * cancelling / scale):
             impulse[kept] = p
             return RigidStep(v_free + _back(factor, rows.T @ p), impulse, residual)
@@ -251,6 +249,45 @@ def _back(factor, right):  # type: ignore[no-untyped-def]
     return found
 
 
+@numba.njit(cache=True, fastmath=False)
+def _scale(jacobian, velocity, bound):  # type: ignore[no-untyped-def]
+    """Return the largest sum of the terms [m/s] of a row of J v − b, of those with a bound."""
+    largest = 0.0
+    for c in range(len(bound)):
+        terms = abs(bound[c])
+        for k in range(len(velocity)):
+            terms += abs(jacobian[c, k] * velocity[k])
+        if np.isfinite(terms):
+            largest = max(largest, terms)
+    return largest
+
+
+@numba.njit(cache=True, fastmath=False)
+def _natural(rows, impulse, offset):  # type: ignore[no-untyped-def]
+    """Return the largest |min(W_ii p_i, w_i)| [m/s] of 0 <= p ⟂ w = A Aᵀ p + b >= 0, and the
+    largest sum of the terms that cancel in A Aᵀ p."""
+    count, d = rows.shape
+    change = np.zeros(d)
+    size = np.zeros(d)
+    for c in range(count):
+        for k in range(d):
+            change[k] += rows[c, k] * impulse[c]
+            size[k] += abs(rows[c, k] * impulse[c])
+    natural = 0.0
+    cancelling = 0.0
+    for c in range(count):
+        diagonal = 0.0
+        w = offset[c]
+        terms = 0.0
+        for k in range(d):
+            diagonal += rows[c, k] ** 2
+            w += rows[c, k] * change[k]
+            terms += abs(rows[c, k]) * size[k]
+        natural = max(natural, abs(min(diagonal * impulse[c], w)))
+        cancelling = max(cancelling, terms)
+    return natural, cancelling
+
+
 def velocity_bounds(
     gap: Floats,
     gamma_minus: Floats,
@@ -262,20 +299,36 @@ def velocity_bounds(
     """Return b (c,) of J v⁺ >= b [m/s], for one e or e (c,); −inf marks contacts that the step
     ignores."""
     e = np.asarray(restitution, np.float64)
-    if not ((e >= 0.0) & (e <= 1.0)).all() or e.shape not in ((), gap.shape):
+    share = np.asarray(stabilization, np.float64)
+    if not _are_shares(e) or e.shape not in ((), gap.shape):
         raise ArgumentError(
             "restitution", restitution, "values in [0, 1], one for all or one for each contact"
         )
-    if not (0.0 <= np.min(stabilization, initial=0.0) <= np.max(stabilization, initial=0.0) <= 1.0):
+    if not _are_shares(share):
         raise ArgumentError("stabilization", stabilization, "values in [0, 1]")
     if scheme not in SCHEMES:
         raise ArgumentError("scheme", scheme, one_of(scheme, SCHEMES))
-    may_close = (scheme == "stewart-trinkle") | ((scheme == "automatic") & (e == 0.0))
-    when_open = np.where(may_close, -gap / dt, -np.inf)
-    newton = 0.0 if scheme == "stewart-trinkle" else e
-    when_closed = newton * np.maximum(-gamma_minus, 0.0)
-    push_out = stabilization * np.maximum(-gap, 0.0) / dt
-    return np.where(gap > CLOSED, when_open, np.maximum(when_closed, push_out))
+    given = gap, gamma_minus, e.ravel(), share.ravel(), dt, SCHEMES.index(scheme)
+    return np.asarray(_bounds(*given))
+
+
+def _are_shares(values: Floats) -> bool:
+    return bool(((values >= 0.0) & (values <= 1.0)).all())
+
+
+@numba.njit(cache=True, fastmath=False)
+def _bounds(gap, gamma, restitution, share, dt, scheme):  # type: ignore[no-untyped-def]
+    """Do `velocity_bounds` for the number of a scheme; one e or share is that of all contacts."""
+    found = np.empty(len(gap))
+    for c in range(len(gap)):
+        e = restitution[min(c, len(restitution) - 1)]
+        if gap[c] > CLOSED:
+            closes = scheme == _STEWART or (scheme == _AUTOMATIC and e == 0.0)
+            found[c] = -gap[c] / dt if closes else -np.inf
+        else:
+            bounced = 0.0 if scheme == _STEWART else e * max(-gamma[c], 0.0)
+            found[c] = max(bounced, share[min(c, len(share) - 1)] * max(-gap[c], 0.0) / dt)
+    return found
 
 
 def friction_step(

@@ -156,14 +156,15 @@ class RigidConstraints:
         # Joint damping is implicit, by M + θ Δt D.
         damping = system.joint_damping
         approach = system.scene.contact.approach_velocity
+        damps = bool(damping.any())
         implicit = _implicit_share(mass, damping, dt)
-        damped = mass + implicit * dt * np.diag(damping)
+        damped = mass + implicit * dt * np.diag(damping) if damps else mass
         thrown = v
         removed = _removed(state, found, dt) if before else np.zeros(len(found.gap))
         struck = step = self._solve(system, damped, q, v, force - damping * v, dt, found, removed)
         blows = _blows(mass, found, step.normal, approach)
         lasts = ~blows
-        if damping.any() and blows.any():
+        if damps and blows.any():
             # The collision comes first, with M alone: an impulse p solved with damping could gain
             # energy on M.
             struck = self._solve(system, mass, q, v, np.zeros_like(v), dt, found, removed)
@@ -171,17 +172,14 @@ class RigidConstraints:
                 _blows(mass, found, struck.normal, approach),
                 np.ones(len(blows), np.bool_),
             )
-            blow = (found.jacobian.T * struck.normal + struck.dragging)[:, blows].sum(axis=1)
-            thrown = v + np.linalg.solve(mass, blow)
+            thrown = v + np.linalg.solve(mass, _sum_of(found, struck, blows))
             moved = replace(found, gamma=found.jacobian @ thrown)
             step = self._solve(
                 system, damped, q, thrown, force - damping * thrown, dt, moved, removed
             )
-        impulse = (found.jacobian.T * struck.normal + struck.dragging)[:, blows].sum(axis=1)
-        pressing, dragging = (
-            part[:, lasts].sum(axis=1) / dt
-            for part in (found.jacobian.T * step.normal, step.dragging)
-        )
+        impulse = _sum_of(found, struck, blows)
+        pressing = (found.jacobian.T * step.normal)[:, lasts].sum(axis=1) / dt
+        dragging = step.dragging[:, lasts].sum(axis=1) / dt
         blow = np.where(blows, struck.normal, 0.0)
         pushed = np.where(lasts, step.normal, 0.0)
         contact_rows.write_contacts(
@@ -191,8 +189,9 @@ class RigidConstraints:
         q_plus, v_plus = free_motion(mechanics, q, step.velocity, dt - before)
         touches = ((found.gap <= 0.0) | (step.normal > 0.0)).any()
         contact_state = COLLIDING if blows.any() else RESTING if touches else FREE
-        slowing = damping * (implicit * step.velocity + (1.0 - implicit) * thrown)
-        return StepResult(q_plus, v_plus, pressing, dragging - slowing, impulse, contact_state)
+        if damps:
+            dragging -= damping * (implicit * step.velocity + (1.0 - implicit) * thrown)
+        return StepResult(q_plus, v_plus, pressing, dragging, impulse, contact_state)
 
     def _solve(
         self,
@@ -216,7 +215,7 @@ class RigidConstraints:
             e = restitution_by_pair(system.scene, np.stack(shapes, axis=1))
             # Contacts that touch together must act together, wherever in a step they do.
             scheme = "stewart-trinkle" if scheme == "automatic" else scheme
-        removed = np.maximum(self.stabilization, np.where(np.equal(e, 0.0), removed, 0.0))
+        removed = np.maximum(self.stabilization, removed * np.equal(e, 0.0))
         if self.friction == "none" or not table.any():
             contacts = StepContacts(found.jacobian, found.gap, e, removed)
             step = rigid_step(mass, v, force, dt, contacts, scheme)
@@ -237,6 +236,13 @@ class RigidConstraints:
         along = np.einsum("csx,cs->cx", tangents, slip)
         dragging = np.einsum("csd,cs->dc", rows, slip)
         return _Solved(velocity, normal, along, dragging)
+
+
+def _sum_of(found: contact_rows.ContactRows, solved: _Solved, chosen: NDArray[np.bool_]) -> Floats:
+    """Return the generalized impulse (d,) of the chosen contacts."""
+    if not chosen.any():
+        return np.zeros(found.jacobian.shape[1])
+    return np.asarray((found.jacobian.T * solved.normal + solved.dragging)[:, chosen].sum(axis=1))
 
 
 def _share_before(system: Any, state: Any) -> float:
@@ -263,7 +269,8 @@ def _removed(state: Any, found: contact_rows.ContactRows, dt: float) -> Floats:
     overlaps add up. An overlap at the start stays.
     """
     back = np.maximum(np.minimum(-found.gap, -found.gamma * dt), 0.0)
-    back *= contact_rows.lasting(state, found)
+    before = int(state.contact_count[0])
+    back *= contact_rows.lasting(state.contacts, before, found.geometry, slice(None))
     return np.divide(back, -found.gap, out=np.zeros(len(back)), where=back > 0.0)
 
 
@@ -299,14 +306,14 @@ def _blows(
 ) -> NDArray[np.bool_]:
     """Return the contacts (c,) of the collision: approaching ones, and pushing ones connected to
     them (W_ij ≠ 0)."""
-    from scipy.sparse.csgraph import connected_components
-
     # Without connected contacts, inner ones of a cradle would act by forces, and the impact alone
     # could gain energy.
     pushes = impulse > 0.0
     struck = pushes & (found.gamma < -approach)
     if not struck.any() or np.array_equal(struck, pushes):
         return struck
+    from scipy.sparse.csgraph import connected_components
+
     rows = found.jacobian[pushes]
     _, island = connected_components(rows @ np.linalg.solve(mass, rows.T) != 0.0, directed=False)
     struck[pushes] = np.isin(island, island[struck[pushes]])

@@ -56,6 +56,8 @@ class Study:
     run : (scene, world, rendering) -> Run, made now or read from a store
     depth : "quick" or "full"; "full" has more cases
     seed : of random impacts and of fresh conditions
+    beside : as `run`, for the fresh cases of a region; by default `run`
+    part : the part that fresh cases decide; "" for all
     asked : called whenever a check uses a run, even if an earlier check made that run
     failures : receives the cases that raise an exception; if it is None, the exceptions propagate
     """
@@ -63,6 +65,8 @@ class Study:
     run: Callable[..., Run] = run_world
     depth: str = "quick"
     seed: int = SEED
+    beside: Callable[..., Run] | None = None
+    part: str = ""
     asked: Callable[[Scene, str, str], None] | None = None
     failures: list[Failure] | None = None
     results: dict[Hashable, Any] = field(default_factory=dict, repr=False)
@@ -84,6 +88,10 @@ class Study:
     def scene(self, name: str) -> Scene:
         """Return a scene of the project by name."""
         return self.once(("scene", name), lambda: load_scene(find_scene(name)))
+
+    def wants(self, part: str) -> bool:
+        """Return whether rows of parts whose name begins like this are needed."""
+        return not self.part or self.part.startswith(part)
 
     def each(
         self, cases: Iterable[Case], results: Callable[[Case], Iterable[Result]]
@@ -149,12 +157,14 @@ class Check:
         chosen = tuple(self.cases(study) if cases is None else cases)
         if self.prepare is not None:
             self.prepare(study, chosen)
+        return self.table_of(self._rows(study, chosen))
 
+    def _rows(self, study: Study, cases: Iterable[Any]) -> Iterator[Row]:
         def rows(case: Any) -> Iterable[Row]:
             found = self.row(study, case)
             return (found,) if isinstance(found, Mapping) else found
 
-        return self.table_of(study.each(chosen, rows))
+        return study.each(cases, rows)
 
     def table_of(self, rows: Iterable[Row]) -> Table:
         """Return the judged table of these rows; a row without a value has None in its place."""
@@ -202,15 +212,25 @@ class Check:
         return finding_of(self.key, self.key, self.question, "", parts, {self.key: table})
 
     def _fresh(self, study: Study | None, name: str) -> Callable[[Region], Table] | None:
-        """Return the function that draws and judges fresh rows of a part inside a region."""
+        """Return the function that draws and judges fresh rows of a part inside a region, up to
+        the first that fails."""
         draw = self.draw
         if study is None or draw is None:
             return None
 
+        beside = replace(study, run=study.beside or study.run, asked=None, part=name)
+
         def drawn(region: Region) -> Table:
-            table = self.table(study, draw(study, region))
-            rows = by_part(table).get(name, table.only(()))
-            return rows.only(region.contains(row) for row in rows.records())
+            rows = list[Row]()
+            found = self.table_of(rows)
+            for case in draw(study, region):
+                rows += self._rows(beside, [case])
+                table = self.table_of(rows)
+                found = by_part(table).get(name, table.only(()))
+                found = found.only(region.contains(row) for row in found.records())
+                if False in found.holds:
+                    break
+            return found
 
         return drawn
 

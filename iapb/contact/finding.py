@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from iapb.contact.geometry import ContactBuffer, Shapes
 from iapb.contact.kernels.narrow_phase import detect
-from iapb.numerics.compiled import block
+from iapb.numerics.compiled import Entry, block
 from iapb.numerics.schema import Floats, Indices, Integers, zeros_of
 
 FIRST_ROOM = 64  # contacts; the buffer grows when there are more
@@ -36,7 +38,8 @@ class ContactFinder:
 
     def __init__(self, shapes: Shapes, pairs: Indices) -> None:
         self._shapes = block(shapes)
-        self._pairs = pairs
+        self._pairs = np.ascontiguousarray(pairs)
+        self._detect = Entry(detect)
         self._make_room(FIRST_ROOM)
 
     def _make_room(self, contacts: int) -> None:
@@ -53,7 +56,8 @@ class ContactFinder:
         """
         count = 0
         if len(self._pairs):
-            given = self._shapes, self._pairs, rotations, positions, float(margin)
-            while (count := int(detect(*given, self._buffer))) < 0:
+            placed = [np.ascontiguousarray(each, np.float64) for each in (rotations, positions)]
+            given = self._shapes, self._pairs, *placed, float(margin)
+            while (count := int(self._detect(*given, self._buffer))) < 0:
                 self._make_room(2 * len(self._found.gap))
         return Contacts(*(getattr(self._found, name)[:count].copy() for name in Contacts._fields))

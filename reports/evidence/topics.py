@@ -9,6 +9,7 @@ from functools import partial
 from importlib import import_module
 from typing import Any
 
+from reference.worlds import run_world
 from reports.evidence.energy import CERTIFIED_RUNS
 from reports.runner import Runner
 from verification import claims
@@ -86,7 +87,12 @@ def checked_claims(
 
     ids = [claim for claim in claims.CLAIMS if stage_of(claim) == stage]
     found = claims.check_claims(
-        partial(runner, keep=False), depth, ids, progress=begin, asked=runner.use_again
+        partial(runner, keep=False),
+        depth,
+        ids,
+        progress=begin,
+        asked=runner.use_again,
+        beside=run_world,
     )
     failures += [
         replace(one, case=f"{claim.key}, {one.case}") if one.case != claim.key else one

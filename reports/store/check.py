@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from iapb.errors import IapbError, RunFileError
-from reference.hdf5 import attribute_of
+from reference.hdf5 import Budget, attribute_of
 from reports.store.folder import PARTIAL_SUFFIX
 from reports.store.io import (
     WRITING,
@@ -139,7 +139,7 @@ def _compared(path: Path) -> FileState:
         with path.open("rb") as begin:
             stated = data_seal(begin.read(_HEAD))
         with opened(path, None, changed=True) as file:
-            same = data_checksum(file, path) == stated
+            same = data_checksum(file, Budget(path, file)) == stated
             found = str(attribute_of(file, "format", ""))
         if same and found == FORMAT:
             with opened_run(path, changed=True):  # compares its content hash

@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 
 from iapb.errors import IapbError, RunFileError
-from reference.hdf5 import Budget, attribute_of, dataset_at
+from reference.hdf5 import Budget, attribute_of, check_dataset
 from reports.store.schema import ATTRIBUTES, FORMAT, FORMAT_VERSION, TABLE_FORMAT
 
 WRITING = ".writing"  # suffix of a file that is not yet complete
@@ -175,20 +175,23 @@ def data_seal(head: bytes) -> str:
     return first.rpartition(b" ")[2].decode("ascii", "replace")
 
 
-def data_checksum(file: Any, path: Path) -> str:
-    """Return sha256 of all datasets, and of the attributes by which a run is read."""
+def data_checksum(file: Any, budget: Budget | None = None) -> str:
+    """Return sha256 of all datasets, and of the attributes by which a run is read.
+
+    budget : of a file that is not our own, whose datasets are checked first (see `dataset_at`)
+    """
     import h5py
 
     digest = hashlib.sha256()
-    budget = Budget(path, file)
-    names = list[str]()
+    datasets = dict[str, Any]()
     file.visititems(
-        lambda name, item: names.append(name) if isinstance(item, h5py.Dataset) else None
+        lambda name, item: datasets.update({name: item} if isinstance(item, h5py.Dataset) else {})
     )
     for name in ATTRIBUTES:
         digest.update(f"{name} {attribute_of(file, name)!r}\n".encode())
-    for name in sorted(names):
-        dataset = dataset_at(file, name, budget)
+    for name, dataset in sorted(datasets.items()):
+        if budget is not None:
+            check_dataset(dataset, budget)
         digest.update(f"{name} {dataset.dtype.str} {dataset.shape}\n".encode())
         for block in blocks(dataset) if dataset.shape else [np.asarray(dataset[()])]:
             text = block.dtype.hasobject
@@ -280,7 +283,7 @@ def new_file(path: Path, *, replace: bool) -> Iterator[Any]:
         ) as file:
             yield file
             file.flush()
-            data = data_checksum(file, path)
+            data = data_checksum(file)
             image = file.id.get_file_image()
         with written_aside(path, replace=replace) as aside:
             aside.write_bytes(sealed(image, data))

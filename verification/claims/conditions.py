@@ -144,9 +144,13 @@ def start_conditions(depth: str) -> tuple[Condition, ...]:
     return tuple(dict.fromkeys(grid + travels + frictions + thresholds))
 
 
-# Every tilt and clearance of the full depth, at the paper's collision threshold.
-FULL_GRID = tuple(
-    Condition(tilt, clearance) for tilt in TILTS["full"] for clearance in CLEARANCES["full"]
+# Every tilt of the full depth, and every clearance where the verdict turns from hold to fail, at the
+# paper's collision threshold.
+TURNING = 0.03  # [rad]
+WIDE_GRID = tuple(
+    Condition(tilt, clearance)
+    for tilt in TILTS["full"]
+    for clearance in CLEARANCES["full" if tilt <= TURNING else "quick"]
 )
 
 

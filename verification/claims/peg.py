@@ -16,7 +16,7 @@ from iapb.worlds import find_world
 from verification.check import Check, Study
 from verification.claims.conditions import (
     CLEARANCES,
-    FULL_GRID,
+    WIDE_GRID,
     START,
     TILTS,
     UNITS,
@@ -206,7 +206,7 @@ def _trajectory(study: Study, condition: Condition) -> Iterator[Row]:
     """Yield one row per coordinate and one for all three together; then those of pushing only."""
     for row in distances(study, condition, "full"):
         yield {"part": of_setting(row["coordinate"], condition)} | condition.row() | row
-    if condition.collision_threshold > PAPERS:
+    if condition.collision_threshold > PAPERS or study.part:
         return
     ideal = trace(study, condition, "ideal")
     worlds = {name: trace(study, condition, name) for name in (*WORLDS, PUSHING)}
@@ -232,7 +232,7 @@ C10 = peg_claim(
     "C10",
     "The device trajectory of IAPB is closest to ideal, ahead of PB and CBuc.",
     rigid=True,
-    further=FULL_GRID,
+    further=WIDE_GRID,
     fresh=MANY,
     row=_trajectory,
     holds=_trajectory_holds,
@@ -320,16 +320,17 @@ def agreed(differences: Any) -> float:
 def _lost(study: Study, condition: Condition) -> Iterator[Row]:
     """Yield the distances of three renderings to ideal, the device's overlap with the walls, and
     settling times."""
-    ideal = trace(study, condition, "ideal")
     traces = {rendering: trace(study, condition, "IAPB", rendering) for rendering in RENDERINGS}
-    window = comparison_window([ideal, *traces.values()])
     full = settling_times(trace(study, condition, "IAPB"))
-    far = [root_mean_square(one, ideal, window) for one in traces.values()]
-    found = {
-        **dict(zip(COORDINATES, np.transpose(far), strict=True)),
+    found: dict[str, Any] = {
         OVERLAP: [*map(device_overlap, traces.values())],
         SETTLING: [*map(settling_times, traces.values())],
     }
+    if any(map(study.wants, COORDINATES)):
+        ideal = trace(study, condition, "ideal")
+        window = comparison_window([ideal, *traces.values()])
+        far = [root_mean_square(one, ideal, window) for one in traces.values()]
+        found = dict(zip(COORDINATES, np.transpose(far), strict=True)) | found
     for measure, values in found.items():
         saturate, scale, spread = each = np.reshape(values, (len(RENDERINGS), -1))
         ahead = {
@@ -381,7 +382,8 @@ def _limited_trajectory(study: Study, condition: Condition) -> Iterator[Row]:
     """Yield per coordinate the distances from ideal, then the penetrations; IAPB spreads its
     impulses over steps."""
     start = condition.row("force_limit", *START)
-    yield from (start | row for row in distances(study, condition, "spread"))
+    if study.part != PENETRATION:
+        yield from (start | row for row in distances(study, condition, "spread"))
     yield start | {
         "coordinate": PENETRATION,
         "IAPB": deepest_penetration(trace(study, condition, "IAPB", "spread")),
@@ -401,7 +403,7 @@ C13 = peg_claim(
     "With device limits, IAPB stays closest to ideal and penetrates less than PB.",
     limited=True,
     rigid=True,
-    further=FULL_GRID,
+    further=WIDE_GRID,
     fresh=MANY,
     row=_limited_trajectory,
     holds=_limited_trajectory_holds,

@@ -57,7 +57,7 @@ def _impact_law(study: Study, name: str) -> Row:
     fault = PLANTED_BUGS[name]
     if verdict.error is not None:
         raise verdict.error
-    broken = check_passivity(fault.make(), impacts=FAULT_IMPACTS, search=0)
+    broken = check_passivity(fault.make(), laws=[name], impacts=FAULT_IMPACTS, search=0)
     return _row(verdict.statement, verdict, fault.name, name in broken.broken_laws)
 
 

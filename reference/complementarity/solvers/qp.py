@@ -55,9 +55,10 @@ def daqp(rows: Floats, offset: Floats) -> Floats:
     unit = np.where(
         length > 0.0, length, 1.0
     )  # unit rows, unit velocities: daqp's tolerances are absolute
-    scale = float(np.abs(offset / unit).max(initial=0.0)) or 1.0
+    lower = -offset / unit
+    scale = float(np.abs(lower).max(initial=0.0)) or 1.0
+    lower /= scale
     upper = np.full(n, _INFINITE)
-    lower = -offset / unit / scale
     sense = np.full(n, _INEQUALITY, dtype=np.int32)
     for accuracy in (_ACTIVE_SET, _OPPOSED):
         _, _, flag, detail = daqp.solve(
