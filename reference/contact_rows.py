@@ -243,9 +243,7 @@ def unit_tangents(normals: Floats, spatial: bool) -> Floats:
     return np.stack([first, np.cross(normals, first)], axis=1)
 
 
-def lasting(
-    contacts: Any, before: int, geometry: Contacts, kept: NDArray[Any] | slice
-) -> NDArray[np.bool_]:
+def lasting(contacts: Any, before: int, geometry: Contacts, kept: Any) -> NDArray[np.bool_]:
     """Return which of the `kept` contacts the step before had, the first `before` of `contacts`."""
     old = {
         *zip(
@@ -279,8 +277,8 @@ def write_contacts(
     if not len(kept):
         return
     into.is_new[: len(kept)] = ~lasting(into, before, found.geometry, kept)
-    for name, column in zip(Contacts._fields, found.geometry, strict=True):
-        getattr(into, name)[: len(kept)] = column[kept]
+    for name in Contacts._fields:
+        getattr(into, name)[: len(kept)] = getattr(found.geometry, name)[kept]
     into.normal_velocity[: len(kept)] = found.gamma[kept]
     into.normal_force[: len(kept)] = pushed[kept] / dt
     into.friction_force[: len(kept)] = friction[kept] / dt

@@ -56,7 +56,8 @@ class Study:
     run : (scene, world, rendering) -> Run, made now or read from a store
     depth : "quick" or "full"; "full" has more cases
     seed : of random impacts and of fresh conditions
-    beside : as `run`, for the fresh cases of a region; by default `run`
+    simulate : as `run`, but never stored: for fresh cases, and for runs that take less time than
+        their file; by default `run`
     part : the part that fresh cases decide; "" for all
     asked : called whenever a check uses a run, even if an earlier check made that run
     failures : receives the cases that raise an exception; if it is None, the exceptions propagate
@@ -65,7 +66,7 @@ class Study:
     run: Callable[..., Run] = run_world
     depth: str = "quick"
     seed: int = SEED
-    beside: Callable[..., Run] | None = None
+    simulate: Callable[..., Run] | None = None
     part: str = ""
     asked: Callable[[Scene, str, str], None] | None = None
     failures: list[Failure] | None = None
@@ -73,6 +74,7 @@ class Study:
 
     def __post_init__(self) -> None:
         check_depth(self.depth)
+        self.simulate = self.simulate or self.run
 
     def once(self, key: Hashable, compute: Callable[[], Result]) -> Result:
         """Return the result of `compute`, which is called only once for each key."""
@@ -218,7 +220,7 @@ class Check:
         if study is None or draw is None:
             return None
 
-        beside = replace(study, run=study.beside or study.run, asked=None, part=name)
+        beside = replace(study, run=study.simulate or study.run, asked=None, part=name)
 
         def drawn(region: Region) -> Table:
             rows = list[Row]()

@@ -25,8 +25,6 @@ from reports.store.io import write_whole
 from reports.store.keys import evidence_version
 from reports.workers import REPORT_WORKERS, executor
 from verification import haptic_rate
-from verification.check import Study
-from verification.claims import peg
 from verification.claims.numbers import claim_tables
 from verification.cost import effects
 from verification.cost.accuracy import numbers_of, recommended
@@ -56,8 +54,7 @@ SHOWN_SCENES = (
 FIGURE_RUNS = "runs of the figures"
 CERTIFIED = "energy"  # the stage that needs all runs of the others
 # The first stages to be computed are the longest.
-ON_THE_PEG = "claims on the peg"
-FIRST = ("proofs", ON_THE_PEG, "hard-cases", "energy, without times", "claims")
+FIRST = ("proofs", "hard-cases", "claims on the peg", "claims", "energy, without times")
 BESIDE = "parts that measure no time"
 
 
@@ -186,8 +183,6 @@ def _compute_beside(stages: dict[str, Stage], out: Path, depth: str, progress: P
     with suppress(IapbError), executor(REPORT_WORKERS) as pool:
         jobs: list[Future[Any]] = [pool.submit(_figure_runs, out)]
         for name in ahead:
-            if name == ON_THE_PEG:
-                jobs.append(pool.submit(_slowest_runs, out, depth))
             jobs.append(pool.submit(_fill, stages[name], Runner(out / "runs"), depth, silent))
         progress(BESIDE, 0, len(jobs))
         for done, job in enumerate(as_completed(jobs), 1):
@@ -205,17 +200,6 @@ def _figure_runs(out: Path) -> None:
     """Simulate the runs of the figures, in a worker; the parent reads them, and tries again those
     that fail."""
     runs.figure_runs(Runner(out / "runs"), silent, [])
-
-
-def _slowest_runs(out: Path, depth: str) -> None:
-    """Simulate runs of the claims on the peg, in a worker, until one exists: the last first."""
-    runner = Runner(out / "runs")
-    for scene, world in peg.slowest_runs(Study(runner, depth)):
-        if (out / "runs" / runner.file_of(scene, world)).is_file():
-            return
-        attempt(
-            "", partial(runner, scene, world, keep=False), []
-        )  # the claim that needs it will name the failure
 
 
 def provenance() -> dict[str, str]:

@@ -92,7 +92,7 @@ def checked_claims(
         ids,
         progress=begin,
         asked=runner.use_again,
-        beside=run_world,
+        simulate=run_world,
     )
     failures += [
         replace(one, case=f"{claim.key}, {one.case}") if one.case != claim.key else one
