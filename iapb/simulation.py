@@ -246,12 +246,14 @@ class Simulation:
                 raise ArgumentError(
                     f"{law} {what}", int(count), f"a count from 0 to {most}, the size of its buffer"
                 )
-        vectors = {name: np.asarray(getattr(result, name)) for name in _STEP_VECTORS}
-        targets = [getattr(state, name) for name in _STEP_VECTORS]
-        for (name, values), target in zip(vectors.items(), targets, strict=True):
+        vectors = [
+            (name, np.asarray(getattr(result, name)), getattr(state, name))
+            for name in _STEP_VECTORS
+        ]
+        for name, values, target in vectors:
             if values.shape != target.shape or not np.isfinite(values).all():
                 raise ArgumentError(f"{law} {name}", values, f"{len(target)} finite numbers")
-        for values, target in zip(vectors.values(), targets, strict=True):
+        for _, values, target in vectors:
             target[:] = values
         tool = self.system.tool_tree
         state.state_of_tree[tool if tool >= 0 else slice(None)] = result.state
@@ -271,8 +273,8 @@ class Simulation:
                 self._step()
             except (IapbError, KeyboardInterrupt) as stop:
                 return k, stop
-            last = self.steps_done - 1
-            run_steps(self.world, self.state, self.port, record, WRITE, last, 1)
+            done = self.steps_done - 1
+            run_steps(self.world, self.state, self.port, record, WRITE, done, 1)
         return steps, None
 
     def _plan(self, steps: int) -> tuple[int, IapbError | None]:

@@ -127,10 +127,6 @@ class Check:
         `parts`, in which the code forbids a failure
     draw : (study, region) -> fresh cases inside a region, which confirm it; None if there are no
         fresh cases
-    prepare : (study, cases), called before the first row, for example to compute on several cores
-    rule : the outcomes of all rows -> the verdict of a topic's sentence; by default one failure
-        refutes
-    note : text printed below the table; digits : significant digits in print
     timed_rows : True if the selection of rows depends on measured times
     """
 
@@ -148,18 +144,11 @@ class Check:
     roles: Mapping[str, str] = field(default_factory=dict, hash=False)
     by_design: Mapping[str, str] = field(default_factory=dict, hash=False)
     draw: Callable[[Study, Region], Iterable[Any]] | None = None
-    prepare: Callable[[Study, Sequence[Any]], object] | None = None
-    rule: Callable[[Iterable[bool | None]], str] = verdict_of_law
-    note: str = ""
-    digits: int = 4
     timed_rows: bool = False
 
     def table(self, study: Study, cases: Iterable[Any] | None = None) -> Table:
         """Return the judged rows of the given cases; by default of all cases."""
-        chosen = tuple(self.cases(study) if cases is None else cases)
-        if self.prepare is not None:
-            self.prepare(study, chosen)
-        return self.table_of(self._rows(study, chosen))
+        return self.table_of(self._rows(study, self.cases(study) if cases is None else cases))
 
     def _rows(self, study: Study, cases: Iterable[Any]) -> Iterator[Row]:
         def rows(case: Any) -> Iterable[Row]:
@@ -173,9 +162,7 @@ class Check:
         given = list(rows)
         table = table_from(
             given,
-            self.digits,
-            self.note,
-            self.timed_rows,
+            timed_rows=self.timed_rows,
             condition=self.conditions,
             part=self.parts,
             cases=self.counts,
@@ -245,7 +232,7 @@ class Check:
             return ()
         held, decided, unknown = counts_of(table)
         timed = any(column.timed for column in table.columns)
-        verdict = self.rule(table.holds)
+        verdict = verdict_of_law(table.holds)
         return (Part("", verdict, self.question, held, decided, unknown, timed=timed),)
 
 

@@ -200,7 +200,6 @@ EACH = Check(
     targets=no_targets,
     timed=TIMED,
     timed_rows=True,
-    digits=2,
 )
 RATIOS = Check(
     key="ratios",
@@ -210,7 +209,6 @@ RATIOS = Check(
     targets=ratio_targets,
     timed=TIMED,
     timed_rows=True,
-    digits=2,
 )
 BENCH = Topic(
     key="haptic-rate",

@@ -60,7 +60,7 @@ class Table:
     columns: tuple[Column, ...]
     rows: tuple[tuple[Any, ...], ...] = ()
     holds: tuple[bool | None, ...] = ()
-    digits: int = 4
+    digits: int = 3
     note: str = ""
     timed_rows: bool = False
 
@@ -152,7 +152,7 @@ class Table:
 def titled(
     titles: Sequence[str],
     rows: Iterable[Sequence[Any]] = (),
-    digits: int = 4,
+    digits: int = 3,
     note: str = "",
     timed: Collection[str] = (),
     timed_rows: bool = False,
@@ -172,7 +172,7 @@ def titled(
 
 def table_from(
     rows: Iterable[Row],
-    digits: int = 4,
+    digits: int = 3,
     note: str = "",
     timed_rows: bool = False,
     **marks: Collection[str],

@@ -38,7 +38,7 @@ class ContactFinder:
 
     def __init__(self, shapes: Shapes, pairs: Indices) -> None:
         self._shapes = block(shapes)
-        self._pairs = np.ascontiguousarray(pairs)
+        self._pairs = pairs
         self._detect = Entry(detect)
         self._make_room(FIRST_ROOM)
 
@@ -56,7 +56,7 @@ class ContactFinder:
         """
         count = 0
         if len(self._pairs):
-            placed = [np.ascontiguousarray(each, np.float64) for each in (rotations, positions)]
+            placed = map(np.ascontiguousarray, (rotations, positions))
             given = self._shapes, self._pairs, *placed, float(margin)
             while (count := int(self._detect(*given, self._buffer))) < 0:
                 self._make_room(2 * len(self._found.gap))

@@ -1,9 +1,4 @@
-"""Benchmark of solvers: one row per solver and problem with recomputed residuals, and their
-performance profile.
-
-Source of the profile: Dolan and Moré, Benchmarking optimization software with performance profiles
-(2002).
-"""
+"""Benchmark of solvers: one row per solver and problem with recomputed residuals."""
 
 from __future__ import annotations
 

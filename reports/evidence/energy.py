@@ -4,7 +4,7 @@ of the report, whose impacts are judged in exact arithmetic."""
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -65,14 +65,16 @@ def _rows(folder: Path, name: str) -> list[Row]:
     ]
 
 
-def _certify_beside(study: Study, names: Sequence[str]) -> None:
-    """Certify the runs in processes; a run that raises there is tried again, and named, without
-    them."""
+def _runs(study: Study) -> list[str]:
+    """Return the names of the runs, certified in processes; a run that raises there is tried again,
+    and named, without them."""
+    names = sorted(study.run.files)  # type: ignore[attr-defined]
     if len(names) > FEW:
         rows = partial(_rows, study.run.store.folder)  # type: ignore[attr-defined]
         with executor(REPORT_WORKERS) as pool:
             found = zip(names, pool.map(partial(attempted, rows), names), strict=True)
             study.results.update((name, given) for name, given in found if given is not None)
+    return names
 
 
 def attempted(compute: Callable[[Any], Any], part: Any) -> Any:
@@ -84,10 +86,6 @@ def _known(value: float) -> float | None:
     return None if np.isnan(value) else value
 
 
-def _runs(study: Study) -> Any:
-    return sorted(study.run.files)  # type: ignore[attr-defined]
-
-
 def _targets(table: Table) -> Iterator[Part]:
     yield Part.on("impacts in runs that gain energy", _sum(table, "gains"), 0)
 
@@ -96,10 +94,8 @@ RUNS = Check(
     key=CERTIFIED_RUNS,
     question="Does an impact of any run gain energy, in exact arithmetic?",
     cases=_runs,
-    prepare=_certify_beside,
     row=_certified,
     targets=_targets,
-    digits=2,
 )
 
 

@@ -11,68 +11,10 @@ import pytest
 from iapb.errors import ArgumentError, SolverError
 from iapb.scene import Scene, find_scene, load_scene, scene_from_text
 from iapb.simulation import simulate
-from reference.event_driven import LinearSystem, event_driven
 from reference.scene_events import scene_truth
 from reference.worlds import run_world
 from tests.reference.scenes import G, scene_of
 from verification.certificate import certify
-
-
-def ball(e: float, mass: float = 1.0) -> LinearSystem:
-    return LinearSystem([[mass]], [-9.81 * mass], [[1.0]], [0.0], e)
-
-
-def row_of_balls(masses: list[float], e: float) -> LinearSystem:
-    """Balls on a line, coordinates left to right, radius absorbed."""
-    n = len(masses)
-    return LinearSystem(
-        np.diag(masses), np.zeros(n), np.diff(np.eye(n), axis=0), np.zeros(n - 1), e
-    )
-
-
-def test_ball_bounces_at_the_times_of_the_textbook() -> None:
-    e = 0.8
-    height = 1.0
-    g = 9.81
-    exact = event_driven(ball(e), [height], [0.0], 2.0)
-    fall = np.sqrt(2.0 * height / g)
-    expected = fall * np.array([0.0, 1.0, 1.0 + 2.0 * e, 1.0 + 2.0 * e + 2.0 * e**2])
-    assert exact.event_time[:4] == pytest.approx(expected, rel=1e-14)
-    assert exact.v[1, 0] == pytest.approx(e * g * fall, rel=1e-14)
-
-
-def test_accumulating_impacts_are_reported_not_crossed() -> None:
-    """Beyond fall (1 + e)/(1 − e) the ball rests; the trajectory ends before and says where."""
-    exact = event_driven(ball(0.5), [1.0], [0.0], 10.0, most_events=30)
-    limit = np.sqrt(2.0 / 9.81) * 1.5 / 0.5
-    assert exact.end <= limit and exact.end == pytest.approx(limit, rel=1e-6)
-    with pytest.raises(ArgumentError, match="times in"):
-        exact.state([5.0])
-
-
-def test_plastic_block_slides_into_the_corner_and_rests() -> None:
-    """A block pushed right and down: floor, then wall, then still; each wall's impulse is the lost
-    momentum."""
-    rows = [[0.0, 1.0], [-1.0, 0.0]]
-    start = [0.0, 1.0]
-    system = LinearSystem(2.0 * np.eye(2), [1.0, -4.0], rows, start, 0.0)
-    exact = event_driven(system, [0.0, 0.25], [0.0, 0.0], 5.0)
-    assert exact.event_time == pytest.approx([0.0, 0.5, 2.0], rel=1e-14)
-    assert exact.impulse[1] == pytest.approx([2.0, 0.0]) and exact.impulse[2] == pytest.approx(
-        [0.0, 2.0]
-    )
-    q, v = exact.state([5.0])
-    assert q[0] == pytest.approx([1.0, 0.0], abs=1e-14) and np.abs(v).max() <= 1e-14
-
-
-def test_a_resting_contact_opens_when_the_force_lifts_it_and_equal_elastic_balls_exchange_their_velocities() -> (
-    None
-):
-    lifted = LinearSystem([[1.0]], [1.0], [[1.0]], [0.0], 0.0)
-    assert event_driven(lifted, [0.0], [0.0], 2.0).state([2.0])[0][0, 0] == pytest.approx(2.0)
-    exact = event_driven(row_of_balls([1.0, 1.0, 1.0], 1.0), [0.0, 1.0, 2.5], [1.0, 0.0, 0.0], 10.0)
-    assert exact.v[-1] == pytest.approx([0.0, 0.0, 1.0], abs=1e-14)
-
 
 DROP = scene_of(
     {
@@ -97,14 +39,20 @@ ARM = {
 
 
 def test_a_dropped_ball_is_the_ball_of_the_exact_events() -> None:
-    """Two truths that share no code between events: arcs in closed form, and an integrator with
-    root finding."""
-    exact = event_driven(LinearSystem([[0.5]], [-0.5 * G], [[1.0]], [0.0], 0.6), [0.2], [0.0], 0.5)
+    """Arcs in closed form, against an integrator with root finding."""
     truth = scene_truth(DROP, 0.5)
     time = np.linspace(0.0, 0.5, 51)
-    assert truth.events == pytest.approx(exact.event_time[1:], abs=1e-9)
+    fall = np.sqrt(2.0 * 0.2 / G)
+    hits = fall * np.array([1.0, 2.2])  # e = 0.6
+    assert truth.events == pytest.approx(hits, abs=1e-9)
     q, _ = truth.state(time)
-    assert q[:, 2] - 0.04 == pytest.approx(exact.state(time)[0][:, 0], abs=1e-9)
+    begun = [time - hits[0], time - hits[1]]
+    height = np.select(
+        [time < hits[0], time < hits[1]],
+        [0.2 - 0.5 * G * time**2, (0.6 * G * fall - 0.5 * G * begun[0]) * begun[0]],
+        (0.36 * G * fall - 0.5 * G * begun[1]) * begun[1],
+    )
+    assert q[:, 2] - 0.04 == pytest.approx(height, abs=1e-9)
     assert q[:, 0] == pytest.approx(0.3 * time, abs=1e-9)
     assert np.linalg.norm(q[:, 3:], axis=1) == pytest.approx(1.0, abs=1e-9)
 

@@ -209,7 +209,6 @@ MAP = Check(
         and row["momentum outside range(Jᵀ)"] <= MOMENTUM
     ),
     targets=_map_targets,
-    digits=2,
 )
 
 
@@ -251,5 +250,4 @@ TWO_CONTACTS = Check(
     row=_two_contacts,
     holds=lambda row: row["agreement predicted"] == row["agreement found"],
     targets=_grid_targets,
-    digits=3,
 )

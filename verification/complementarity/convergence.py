@@ -223,5 +223,4 @@ CONVERGENCE = Check(
     cases=lambda study: [case for case in CASES if study.depth == "full" or case.scene in QUICK],
     row=lambda study, case: converge(case),
     targets=_targets,
-    digits=2,
 )

@@ -147,7 +147,6 @@ FRICTION = Check(
     cases=lambda study: product(RESTITUTIONS, FRICTIONS),
     row=with_friction,
     targets=_friction_targets,
-    digits=2,
     holds=lambda row: bool(
         row["share equal to the NCP"] == row["all contacts push"]
         and row["largest change of KE, IAPB"] <= GAIN
@@ -195,7 +194,6 @@ UNEQUAL = Check(
     cases=lambda study: ("all approach", "mixed signs"),
     row=with_unequal,
     targets=_unequal_targets,
-    digits=2,
     holds=lambda row: bool(
         row["distance from Poisson's law"] <= SAME_LAW and row["largest change of KE, IAPB"] <= GAIN
     ),

@@ -68,5 +68,4 @@ LANDINGS = Check(
     question="What do both laws do to a bar that lands on two posts?",
     cases=lambda study: (*COSINES, PEG),
     row=_row,
-    digits=2,
 )

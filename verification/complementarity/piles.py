@@ -116,5 +116,4 @@ PILES = Check(
     cases=lambda study: SPHERES[study.depth],
     row=_row,
     targets=_targets,
-    digits=2,
 )

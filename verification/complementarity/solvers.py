@@ -175,7 +175,6 @@ def _collection(name: str, folder: Path) -> Check:
         holds=lambda row: "solved" in row.values(),
         targets=_targets,
         timed=["spread of velocities"],
-        digits=2,
     )
 
 

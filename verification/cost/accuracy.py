@@ -243,7 +243,6 @@ ACCURACY = Check(
     row=partial(_measured, WAYS, ROUNDS),
     timed=MEASURED,
     timed_rows=True,
-    digits=3,
 )
 
 
@@ -509,6 +508,5 @@ BUDGET_ROWS = Check(
     question="What does an impact give that stops early?",
     row=stopped,
     targets=budget_targets,
-    digits=3,
     cases=lambda _: [Stopped(d, c, k) for d, c in TRUNCATED for k in range((2 * d) // 3 + 1)],
 )

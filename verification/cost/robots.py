@@ -79,6 +79,4 @@ ROBOTS = Check(
     cases=lambda _: FILES,
     row=time_robot,
     timed=("ours", "Pinocchio", "ratio", "lower quartile", "upper quartile"),
-    digits=3,
-    note="test robots of other projects" if OTHERS else "test robots of this project",
 )

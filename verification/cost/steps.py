@@ -180,7 +180,6 @@ RACES = Check(
     question="How long is a step, compared with MuJoCo's?",
     row=race,
     cases=lambda _: RESTING if find_spec("mujoco") else (),
-    digits=3,
     timed=(
         "MuJoCo's step",
         "ratio",
@@ -285,5 +284,4 @@ BODIES = Check(
     row=step_of_bodies,
     targets=body_targets,
     timed=("step",),
-    digits=3,
 )

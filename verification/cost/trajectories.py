@@ -375,14 +375,12 @@ MOTIONS = Check(
     cases=lambda _: TRAJECTORY_SCENES,
     row=motions_of,
     timed=("time", "outcome", "note"),
-    digits=3,
 )
 WORTH = Check(
     key="worth",
     question="What does ten times the accuracy cost?",
     cases=lambda _: WORLDS,
     row=lambda study, world: worth(study.table(MOTIONS), world),
-    digits=2,
     timed=(
         "tenfold accuracy costs",
         "least cost",

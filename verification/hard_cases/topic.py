@@ -76,7 +76,6 @@ EVERY_METHOD = Check(
     holds=is_right,
     targets=_targets,
     prose=("note",),
-    digits=2,
 )
 
 

@@ -156,5 +156,4 @@ TABLE = Check(
     cases=_cases,
     row=lambda study, case: judged_impacts(*case),
     targets=_targets,
-    digits=2,
 )

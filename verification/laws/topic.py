@@ -205,5 +205,4 @@ COUNTEREXAMPLES = Check(
     cases=lambda study: MAKERS,
     row=lambda study, name: MAKERS[name](),
     prose=("M", "J", "v⁻", "e", "v⁺", "test", "relative energy gain"),
-    digits=2,
 )

@@ -294,7 +294,6 @@ AGAINST_PINOCCHIO = Check(
     row=_rows,
     holds=lambda row: bool(row["worst"] <= AGREEMENT),
     targets=_targets,
-    digits=2,
 )
 
 # condition numbers κ(A): up to the first, plain rounding; beyond the second, not compared
@@ -349,6 +348,5 @@ IMPULSE_DYNAMICS = Check(
     cases=lambda _: (2000,),
     row=_impulse_dynamics,
     targets=_impulse_targets,
-    digits=2,
     holds=lambda row: bool(row["largest difference"] <= row["tolerance"]),
 )

@@ -78,5 +78,4 @@ ORDINARY = Check(
     row=_row,
     holds=lambda row: bool(row[f"{OURS} is right"]),
     targets=_targets,
-    digits=2,
 )

@@ -310,5 +310,4 @@ TOUCH = Check(
     row=_rows,
     holds=lambda row: bool(row["error, impacts at the touch"] < row["error, impacts at the step"]),
     targets=_targets,
-    digits=2,
 )

@@ -89,5 +89,4 @@ SCENES = Check(
     row=_row,
     targets=_targets,
     prose=("stopped",),
-    digits=2,
 )

@@ -78,6 +78,4 @@ PEG = Check(
     cases=lambda study: product(DEVICES, STIFFNESSES[study.depth], DAMPINGS[study.depth]),
     row=_contacts,
     targets=peg,
-    digits=3,
-    note="A dash: the peg never came to rest. Late: as in the loops above, with angles rounded to 10 µrad.",
 )

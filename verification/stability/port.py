@@ -95,8 +95,6 @@ PORT = Check(
     question="How much damping does a device need so that no hand draws energy from the loop?",
     cases=lambda study: COUPLINGS,
     row=_needs,
-    note=f"At {RATE:g} Hz, K = {STIFFNESS:g} N/m, B = {DAMPING:g} N s/m, tool of 2 kg, e = 0. "
-    f"Slow hands: without frequencies above {FASTEST:g} Hz, measured.",
 )
 EDGES = Check(
     key="edges",

@@ -126,9 +126,6 @@ MAPS = Check(
     cases=lambda study: loops(),
     row=_marks,
     targets=_of_maps,
-    digits=3,
-    note="Last two columns: one mark per wall damping, from small to large: + the mass comes "
-    "to rest, o it keeps bouncing, x its motion grows.",
 )
 DAMPINGS = Check(
     key="dampings",
@@ -142,12 +139,6 @@ HARDNESS = Check(
     cases=lambda study: loops(),
     row=_hardness,
     targets=_hard,
-    digits=3,
-    note="Wall damping 50 N s/m, as in the paper. Rate-hardness: the rise of the force per second over the "
-    "first step of contact, divided by the approach speed (Lawrence and others, 2000). An impulse "
-    "is given in one "
-    "step, so its rate-hardness grows with the square of the rate. A limited device renders part "
-    "of this rise.",
 )
 
 contact_stability = Topic(

@@ -13,7 +13,6 @@ from iapb.errors import SolverError
 from reference.complementarity import ImpactProblem, laws
 from reference.complementarity.laws import newton_equality, newton_lcp, poisson
 from reference.complementarity.solvers import qp
-from reference.event_driven import LinearSystem, event_driven
 from reference.exact import bulk_energy_gain
 from reference.rigid_step import STEP_SOLVERS, nearest_velocity
 
@@ -82,12 +81,9 @@ def test_adhesion_is_told_from_an_artefact() -> None:
 
 
 def test_laws_and_steps_go_on_where_daqp_cycles(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The Newton LCP, Poisson, steps and event-driven motions ask other solvers, and say so where
+    """The Newton LCP, Poisson and steps ask other solvers, and say so where
     none is left."""
     problem = random_problem(7, 8, 0.5)
-    row = LinearSystem(
-        np.eye(2), [0.0, -9.81], [[0.0, 1.0], [0.0, 1.0], [-1.0, 0.0]], [0.0, 0.0, 1.0], 0.5
-    )
 
     def outcomes() -> list[np.ndarray]:
         step = nearest_velocity(
@@ -97,7 +93,6 @@ def test_laws_and_steps_go_on_where_daqp_cycles(monkeypatch: pytest.MonkeyPatch)
             newton_lcp(problem).velocity,
             poisson(problem).velocity,
             step.velocity,
-            event_driven(row, [0.0, 0.5], [1.0, 0.0], 1.2).v[-1],
         ]
 
     def cycle(*_: object) -> np.ndarray:
