@@ -148,16 +148,14 @@ class Simulation:
         return copied_step(self.system, self.state)
 
     def _step(self) -> None:
-        state = self.state
-        port = self.port
         if self._planned:
-            port.wrench[:] = wrench_of(self.scene, (self.steps_done + 0.5) * self.system.dt)
+            self.port.wrench[:] = wrench_of(self.scene, (self.steps_done + 0.5) * self.system.dt)
         moved = MOVE if self.link is None else 0
         if self.compiled:
             self._do(COUPLE | ADVANCE | RENDER | moved)
         else:
             self._do(COUPLE)
-            self._take(self.law.advance(self.system, state, port.applied, self.system.dt))
+            self._take()
             self._do(RENDER | moved)
         if self.link is not None:
             self.link.exchange()
@@ -179,9 +177,7 @@ class Simulation:
             for k in range(len(q)):
                 self._read(self.world, self.state, self.port, q[k], v[k])
                 self._do(COUPLE)
-                self._take(
-                    self.law.advance(self.system, self.state, self.port.applied, self.system.dt)
-                )
+                self._take()
                 self._do(RENDER)
                 forces[k] = self.port.device_force
         if status:
@@ -227,10 +223,11 @@ class Simulation:
         self.port.wrench[:] = 0.0
         self.port.wrench[[0, 1, 5] if force.shape == (3,) else slice(None)] = force
 
-    def _take(self, result: StepResult) -> None:
-        """Copy the result of a law written in Python into the state that the device and the record
-        read."""
+    def _take(self) -> None:
+        """Do the step of a law written in Python, and copy its result into the state that the device
+        and the record read."""
         state = self.state
+        result = self.law.advance(self.system, state, self.port.applied, self.system.dt)
         law = f"the law {self.law.name!r} returned"
         if not isinstance(result, StepResult):
             raise ArgumentError(f"{law} result", result, "a StepResult")
@@ -246,15 +243,13 @@ class Simulation:
                 raise ArgumentError(
                     f"{law} {what}", int(count), f"a count from 0 to {most}, the size of its buffer"
                 )
-        vectors = [
-            (name, np.asarray(getattr(result, name)), getattr(state, name))
-            for name in _STEP_VECTORS
-        ]
-        for name, values, target in vectors:
+        vectors = {name: np.asarray(getattr(result, name)) for name in _STEP_VECTORS}
+        for name, values in vectors.items():
+            target = getattr(state, name)
             if values.shape != target.shape or not np.isfinite(values).all():
                 raise ArgumentError(f"{law} {name}", values, f"{len(target)} finite numbers")
-        for _, values, target in vectors:
-            target[:] = values
+        for name, values in vectors.items():
+            getattr(state, name)[:] = values
         tool = self.system.tool_tree
         state.state_of_tree[tool if tool >= 0 else slice(None)] = result.state
 
