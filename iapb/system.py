@@ -70,6 +70,8 @@ class System:
         self.pairs, self.remarks = scene_parts.pairs_and_remarks(scene, self.shapes)
         self.stops = scene_parts.stops_of(scene, self.mechanism)
         self.capacity = contact_capacity(self.shapes, self.pairs) + len(self.stops.bound)
+        if scene.contact.at_touch:  # a step also keeps those that have struck and are apart
+            self.capacity *= 2
         self.joint_damping = scene_parts.joint_damping_of(scene)
         self.joint_friction = scene_parts.joint_friction_of(scene)
         self.start = scene_parts.start_of(scene)

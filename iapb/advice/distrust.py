@@ -485,11 +485,18 @@ def _crosses(run: Run, one: Solid, other: Solid, k: Integers) -> Booleans:
         (one.points @ np.swapaxes(turned, 1, 2) + (at - origin)[:, None]) @ turn
         for (turned, at), (turn, origin) in zip(ours, theirs, strict=True)
     )
-    bends = [
-        np.linalg.norm(end[0] - start[0], axis=(1, 2))[:, None] ** 2 / 8.0
-        for start, end in (ours, theirs)
+    turns = [
+        np.linalg.norm(end[0] - start[0], axis=(1, 2))[:, None] for start, end in (ours, theirs)
     ]
-    arc = np.linalg.norm(one.points, axis=1) * bends[0] + np.linalg.norm(before, axis=2) * bends[1]
+    shift = np.diff(
+        [at - origin for (_, at), (_, origin) in zip(ours, theirs, strict=True)], axis=0
+    )
+    # x'' of a path seen from a body that turns by ω: ω² x, and Coriolis' 2 ω v
+    arc = (
+        np.linalg.norm(one.points, axis=1) * turns[0] * (turns[0] + 2.0 * turns[1])
+        + np.linalg.norm(before, axis=2) * turns[1] ** 2
+        + math.sqrt(2.0) * np.linalg.norm(shift[0], axis=1)[:, None] * turns[1]
+    ) / 8.0
     return np.asarray(other.crossed(before, after, arc, one.radius).any(axis=1))
 
 

@@ -599,8 +599,8 @@ def add_part(state, h):
 def take_contacts(world, state):
     """Take the contacts at a touch as those of the step; return False if there are too many.
 
-    Contacts of other components stay, and those that have struck and are apart now: the record shows
-    their impulses.
+    Contacts of other components stay. So do those that have struck and are apart now, as far as there
+    is room: the record shows their impulses.
     """
     now = state.contacts
     before = state.previous
@@ -618,13 +618,17 @@ def take_contacts(world, state):
     for i in range(found_count):
         room -= takes_part(world, state, found, i)
     for i in range(count):
-        room -= before.idle[i]
+        room -= before.idle[i] and not is_over(before, i)
     for i in range(count):
+        over = is_over(before, i)
         if not before.idle[i]:
-            apart = state.row_impulse[i] != 0.0 and not is_among(found, found_count, before, i)
-            if not apart or room <= 0:
+            over = state.row_impulse[i] != 0.0 and not is_among(found, found_count, before, i)
+            if not over:
                 continue
+        if over:
             room -= 1
+            if room < 0:
+                continue
         copy_all(now, kept, before, i)
         if not before.idle[i]:
             now.gap[kept] = 0.0
@@ -654,6 +658,12 @@ def take_contacts(world, state):
         kept += 1
     state.contact_count[0] = kept
     return True
+
+
+@kernel
+def is_over(contacts, i):
+    """Return whether contact i has struck in an earlier part of the step and is apart now."""
+    return contacts.idle[i] and contacts.gap[i] == 0.0 and contacts.normal_force[i] == 0.0
 
 
 @kernel
