@@ -10,11 +10,9 @@ import pytest
 
 from iapb.errors import ArgumentError, SolverError
 from iapb.scene import Scene, find_scene, load_scene, scene_from_text
-from iapb.simulation import simulate
 from reference.scene_events import scene_truth
 from reference.worlds import run_world
 from tests.reference.scenes import G, scene_of
-from verification.certificate import certify
 
 DROP = scene_of(
     {
@@ -177,45 +175,3 @@ def test_damped_and_limited_joints_converge_to_the_event_driven_truth(world: str
         run = run_world(limited_arm(rate=rate, **stiffness), world)
         errors.append(float(np.abs(run.q - truth.state(run.time)[0]).max()))
     assert errors[1] < 0.5 * errors[0] < (0.005 if world == "ideal" else 0.05)  # springs sag, too
-
-
-@pytest.mark.parametrize("damping", [1.0, 100.0, 900.0])
-def test_a_blow_comes_before_damping_and_gains_nothing(damping: float) -> None:
-    """m = 1 kg, e = 1: v⁺ = −v⁻, and damping of order two slows it in the same step by (1 − z/2)/(1
-    + z/2), z = dt D."""
-    slider = {
-        "joint": "prismatic",
-        "axis": [1, 0],
-        "inertia": 0.01,
-        "joint_damping": damping,
-        "joint_limits": [-9, 0.1],
-        "velocity": [1000],
-    }
-    run = run_world(
-        scene_of(slider, space=False, duration=0.005, contact={"restitution": 1}), "ideal"
-    )
-    (step,) = run.impacts.step
-    impacts = run.impacts
-    slows = (1.0 - 5e-4 * damping) / (1.0 + 5e-4 * damping)
-    came = 1000.0 * slows**step
-    assert impacts.v_minus[0] == run.v[step] == pytest.approx([came], rel=1e-12)
-    assert impacts.v_plus[0] == pytest.approx([-came], rel=1e-12)
-    assert run.v[step + 1] == pytest.approx([-came * slows], rel=1e-12)
-    assert certify(run).gains == 0 and np.abs(run.energy["impact_loss"]).max() <= 1e-12 * came**2
-    assert (np.diff(run.energy["friction_work"]) < 0.0).all()
-
-
-def test_every_world_takes_the_hands_force_over_time() -> None:
-    table = [[0.0, 0.0, 0.0, 0.0], [0.2, 0.2, 0.1, 0.0]]
-    scene = load_scene(find_scene("peg_corner")).with_values(
-        {"duration": 0.2, "hand.force": [0, 0, 0], "hand.force_table": table}
-    )
-    engine = simulate(scene)
-    rigid = run_world(scene, "ideal")
-    assert np.array_equal(simulate(scene, world="IAPB").hand_force, rigid.hand_force)
-    assert rigid.hand_force[-1, 0] == pytest.approx(
-        0.2 * (len(rigid.time) - 1.5) * scene.step / 0.2
-    )
-    assert engine.hand_force[-1, 0] == rigid.hand_force[-1, 0]
-    with pytest.raises(ArgumentError, match="does not change over time"):
-        scene_truth(scene, 0.2)

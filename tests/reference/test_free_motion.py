@@ -6,14 +6,12 @@ The truth of events has no friction, so only the world "ideal-friction" is asked
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from iapb.errors import ArgumentError, SolverError
 from iapb.mechanics.mechanism import Body, Joint, Mechanism
@@ -29,14 +27,7 @@ from reference.time_stepping import RigidConstraints
 from tests.reference.scenes import G, scene_of
 
 Floats = NDArray[np.float64]
-Moved = Callable[[Scene, float], tuple[Floats, Floats, Floats]]
 UPRIGHT = [0.0, 0.0, 0.0, 1.0]
-
-
-def by_steps(scene: Scene, duration: float) -> tuple[Floats, Floats, Floats]:
-    """Return times (n,), q (n, nq) and v (n, d) of the world "ideal"."""
-    run = simulate(scene, RigidConstraints(), steps=round(duration * scene.rate))
-    return run.time, run.q, run.v
 
 
 def by_events(scene: Scene, duration: float) -> tuple[Floats, Floats, Floats]:
@@ -45,31 +36,8 @@ def by_events(scene: Scene, duration: float) -> tuple[Floats, Floats, Floats]:
     return time, *scene_truth(scene, duration).state(time)
 
 
-both = pytest.mark.parametrize("moved", [by_steps, by_events])
-
-
-def axes_of(quaternions: Floats) -> Floats:
-    """Return rotation matrices (n, 3, 3) of quaternions (n, 4), (x, y, z, w)."""
-    return np.asarray(Rotation.from_quat(quaternions).as_matrix())
-
-
 # --- torque-free motion
 # ------------------------------------------------------------------------------------------
-
-
-@both
-@pytest.mark.parametrize("spin", [1.0, 1000.0])
-def test_a_spinning_sphere_flies_straight(moved: Moved, spin: float) -> None:
-    """The first reference accelerated it from 3 to 434 m/s in a second at 100 rad/s: ω × v was
-    explicit."""
-    ball = {"inertia": [4e-4] * 3, "velocity": [3, 0, 0, 0, 0.6 * spin, 0.8 * spin]}
-    time, q, v = moved(scene_of(ball), 0.1)
-    assert q[:, :3] == pytest.approx(np.outer(time, [3.0, 0.0, 0.0]), abs=1e-9)
-    velocity = axes_of(q[:, 3:]) @ v[:, :3, None]
-    assert velocity[:, :, 0] == pytest.approx(
-        np.broadcast_to([3.0, 0.0, 0.0], (len(time), 3)), abs=1e-8
-    )
-    assert np.linalg.norm(v[:, 3:], axis=1) == pytest.approx(spin, rel=1e-9)
 
 
 def test_floating_trees_that_turn_keep_momentum_and_energy() -> None:

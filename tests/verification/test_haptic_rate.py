@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -20,8 +19,8 @@ from verification.cost.trajectories import (
     tenfold_cost,
     worth,
 )
-from verification.finding import NOT_COMPUTED, REFUTED, REPRODUCED, Finding
-from verification.haptic_rate import BENCH, DERIVED, TOPIC, quoting
+from verification.finding import REFUTED, REPRODUCED
+from verification.haptic_rate import BENCH, DERIVED
 from verification.numbers import read_values
 from verification.table import Table
 
@@ -197,18 +196,3 @@ def test_a_fit_takes_the_runs_on_which_the_error_falls(
     kept = falling(runs_of(_motions(good=errors)))
     assert tuple(run["position"] for run in kept) == used
     assert tenfold_cost(kept) == (cost and pytest.approx(cost))
-
-
-def test_a_report_measures_each_quantity_once_and_quotes_it(tables: Tables) -> None:
-    own = {check.key: tables[check.key] for check in TOPIC.checks}
-    topic = TOPIC.conclude(own)
-    claims = [
-        Finding(key, "", "", "", REPRODUCED, tables={key: tables[key]})
-        for key in (C19.key, C22.key)
-    ]
-    whole = quoting(topic, claims)
-    assert whole.parts == BENCH.conclude(_whole(tables)).parts and not whole.failures
-    assert whole.tables[C22.key] is tables[C22.key]
-    lacking = quoting(topic, claims[:1])
-    assert lacking.parts[-1].verdict == NOT_COMPUTED and lacking.parts[-1].name == C22.key
-    assert quoting(replace(topic, tables={}), claims).parts == topic.parts

@@ -75,19 +75,17 @@ def breach_of_coulomb(T: Floats, p_t: Floats, limit: Floats, v_plus: Floats) -> 
 
 
 class Contact(NamedTuple):
-    """A contact of a step; `name`: its two shapes and its feature; `stop`: ± arm and dof of the end
-    of a joint."""
+    """A contact of a step; `name`: its two shapes and its feature."""
 
     name: tuple[int, int, int]
     bodies: tuple[int, int]
     point: Floats
     normal: Floats
     gap: float
-    stop: tuple[float, int] | None = None
 
 
 def contacts_of(system: System, q: Floats) -> list[Contact]:
-    """Touching shapes, clustered, then the ends of the joints' ranges that are passed."""
+    """Touching shapes, clustered."""
     found = system.contacts_at(q)
     columns = zip(
         found.shape_a, found.shape_b, found.feature, found.body_a, found.body_b, strict=True
@@ -102,42 +100,7 @@ def contacts_of(system: System, q: Floats) -> list[Contact]:
         )
         for k, (a, b, f, i, j) in enumerate(columns)
     ]
-    kept = clustered(touching, system.scene.contact.cluster_distance)
-    return kept + [stop for stop in stops(system, q) if stop.gap <= 0.0]
-
-
-def stops(system: System, q: Floats) -> list[Contact]:
-    """Both ends of each range: gap = ± r (q − bound), r the radius of gyration of all that a
-    revolute joint carries."""
-    m = system.mechanism
-    found = []
-    names = ["world", *(body.name for body in system.scene.bodies)]
-    parents = [names.index(body.parent) - 1 for body in system.scene.bodies]
-    for b, body in enumerate(system.scene.bodies):
-        if body.joint_limits is None:
-            continue
-        dof = int(m.arrays.v_start[b])
-        carried = 0.0
-        for other, each in enumerate(system.scene.bodies):
-            ancestor = other
-            while ancestor >= 0 and ancestor != b:
-                ancestor = parents[ancestor]
-            carried += each.mass * (ancestor == b)
-        arm = (
-            np.sqrt(m.mass_matrix(system.start[0])[dof, dof] / carried)
-            if body.joint == "revolute"
-            else 1.0
-        )
-        for sign, bound in zip((1.0, -1.0), body.joint_limits, strict=True):
-            gap = sign * arm * (q[m.arrays.q_start[b]] - bound)
-            number = 10**6 + len(found)
-            nowhere = np.zeros(3)  # what counts is the row ± r e_k
-            found.append(
-                Contact(
-                    (number, number, 0), (b, parents[b]), nowhere, nowhere, gap, (sign * arm, dof)
-                )
-            )
-    return found
+    return clustered(touching, system.scene.contact.cluster_distance)
 
 
 def one_surface(c: Contact, d: Contact) -> bool:
@@ -167,7 +130,7 @@ def is_new(c: Contact, before: list[Contact], distance: float) -> bool:
     the distance."""
 
     def same(d: Contact) -> bool:
-        near = distance > 0.0 and c.stop is d.stop is None and one_surface(c, d)
+        near = distance > 0.0 and one_surface(c, d)
         return d.name == c.name or near and np.linalg.norm(c.point - d.point) <= distance
 
     return not any(d.gap < -TOUCHING and same(d) for d in before)
@@ -193,8 +156,6 @@ def linked(mechanism: Mechanism, contacts: list[Contact]) -> Any:
 def own_values(scene: Scene, c: Contact) -> tuple[float, float]:
     """(e, μ) of a contact: the smaller e, the geometric mean of μ; what only one gives counts, else
     the scene's."""
-    if c.stop is not None:
-        return scene.contact.restitution, 0.0
     owners = [body for body in scene.bodies for _ in body.shapes] + list(scene.walls)
     e, mu = (
         [value for k in c.name[:2] if (value := getattr(owners[k], field)) is not None]

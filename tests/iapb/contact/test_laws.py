@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from iapb.contact.laws import INTEGRATORS, RENDERINGS, ImpulseAugmented, Penalty
+from iapb.contact.laws import INTEGRATORS, ImpulseAugmented, Penalty
 from iapb.run import COLLIDING, RESTING
 from iapb.scene import Scene, find_scene, load_scene
 from iapb.simulation import simulate
@@ -62,23 +62,6 @@ def test_saturation_clips_the_device_and_nothing_else() -> None:
         simulate(PEG, ImpulseAugmented(rendering=rendering)).q for rendering in ("full", "saturate")
     ]
     assert np.array_equal(*alone)  # without a device it changes nothing
-
-
-def test_spreading_stays_in_collision_longer_than_scaling_and_without_limits_all_renderings_are_one() -> (
-    None
-):
-    longest = {}
-    for rendering in ("scale", "spread"):
-        colliding = simulate(PEG, ImpulseAugmented(rendering=rendering)).state == COLLIDING
-        longest[rendering] = np.max(
-            np.diff(np.flatnonzero(np.diff(np.concatenate([[0], colliding, [0]]))))[::2]
-        )
-    assert longest["spread"] > longest["scale"]
-    first, *others = [
-        simulate(PEG.with_values({"device": None}), ImpulseAugmented(rendering=each)).q
-        for each in RENDERINGS
-    ]
-    assert all(np.array_equal(first, other) for other in others)
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,8 +11,7 @@ from scipy.spatial.transform import Rotation
 from iapb.errors import ArgumentError
 from iapb.mechanics.mechanism import Mechanism
 from iapb.mechanics.urdf import read_urdf
-from iapb.scene import load_scene, scene_folder
-from iapb.simulation import simulate
+from iapb.scene import scene_folder
 
 INERTIAL = """<inertial><origin xyz="0.1 0 0" rpy="0 0 1.5707963267948966"/><mass value="2"/>
   <inertia ixx="1" ixy="0.1" ixz="0" iyy="2" iyz="0" izz="3"/></inertial>"""
@@ -74,13 +72,6 @@ def test_a_floating_base_moves_freely(read):
     assert read(*elements).nv == 0
     floating = read(*elements, floating_base=True)
     assert (floating.nq, floating.nv, floating.bodies[1].mass) == (7, 6, 0.0)
-
-
-def test_a_chain_of_thousands_of_links_is_read(read):
-    n = 3000
-    links = [link(f"l{i}", "") for i in range(n)]
-    joints = [joint(f"j{i}", f"l{i}", f"l{i + 1}", "fixed") for i in range(n - 1)]
-    assert len(read(*links, *joints).names) == n
 
 
 BASE = link("base")
@@ -152,39 +143,3 @@ def test_files_that_are_no_urdf_are_refused(tmp_path, text, named):
     path.write_text(text)
     with pytest.raises(ArgumentError, match=named):
         Mechanism.from_urdf(path)
-
-
-ARM_WITH_SHAPES = """<robot name="r"><link name="base">{base}</link>
-<link name="arm"><inertial><origin xyz="0.2 0 0"/><mass value="1"/>
-  <inertia ixx="0.01" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial>{arm}</link>
-<joint name="j" type="revolute"><parent link="base"/><child link="arm"/>
-  <origin xyz="0 0 0.3"/><axis xyz="0 1 0"/></joint>
-</robot>"""
-SCENE = """name: arm
-dimensions: 3
-rate: 1000
-duration: 1
-gravity: [0, 0, -9.81]
-robots:
-  - name: rob
-    urdf: r.urdf
-    {lines}
-bodies: []
-walls: [{{name: floor, kind: half_space, point: [0, 0, 0], normal: [0, 0, 1]}}]
-contact: {{stiffness: 1e4, damping: 20, restitution: 0, friction: 0, friction_velocity: 1e-2}}
-"""
-
-
-def write(folder: Path, arm: str = "", lines: str = "floating: false") -> Path:
-    (folder / "r.urdf").write_text(ARM_WITH_SHAPES.format(arm=arm, base=""))
-    (folder / "scene.yaml").write_text(SCENE.format(lines=lines))
-    return folder / "scene.yaml"
-
-
-def test_the_ball_at_the_end_of_the_arm_meets_the_floor(tmp_path: Path) -> None:
-    """It falls from 0.3 m until sin(angle) = 0.25/0.4; without its ball it swings through."""
-    angle = np.arcsin(0.25 / 0.4)
-    ball = "shapes: {arm: [{kind: sphere, radius: 0.05, center: [0.4, 0, 0]}]}"
-    run = simulate(load_scene(write(tmp_path, lines=ball)), steps=900)
-    assert run.q[-1, 0] == pytest.approx(angle, abs=1e-2)
-    assert simulate(load_scene(write(tmp_path)), steps=900).q[:, 0].max() > 1.5

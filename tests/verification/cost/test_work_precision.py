@@ -135,13 +135,6 @@ def test_the_choice_is_in_time_makes_no_energy_and_is_as_exact_as_can_be() -> No
     assert "nearest is Gauss-Seidel, stopped after 4 sweeps" in str(nearest)
 
 
-def test_the_method_of_a_size_is_the_fastest_exact_one_of_its_kind() -> None:
-    [row] = study.recommended(KNOWN).records()
-    assert (row["method, compiled"], row["method, from Python"]) == ("Lemke", None)
-    numbers = study.numbers_of(study.recommended(KNOWN))
-    assert (numbers["sizes"], numbers["sizes_iapb"]) == (1, 0)
-
-
 @pytest.mark.parametrize(
     ("named", "given"),
     [
