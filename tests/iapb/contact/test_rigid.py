@@ -155,22 +155,3 @@ def test_a_finger_stops_at_the_other() -> None:
     assert (run.q[:, 2] - run.q[:, 1]).min() > 0.02 - 2.0 * np.abs(run.v).max() * run.dt
     through = simulate(fingers(2.0, contact={"self_collisions": False}))
     assert through.q[-1, 2] - through.q[-1, 1] < 0.0
-
-
-def chain(turns: list[float]) -> Scene:
-    """A chain of links of 0.2 m that hangs folded, each joint turned."""
-    shape = {"kind": "box", "size": [0.2, 0.02], "center": [0.1, 0]}
-    link = {"joint": "revolute", "mass": 0.1, "center_of_mass": [0.1, 0], "inertia": 4e-4}
-    bodies = [
-        link
-        | {"name": f"l{k}", "shapes": [shape], "position": [turn]}
-        | ({"parent": f"l{k - 1}", "origin": [0.2, 0]} if k else {})
-        for k, turn in enumerate(turns)
-    ]
-    return made(bodies, gravity=[0, -G], duration=1.0)
-
-
-def test_links_that_overlap_at_the_start_never_touch_and_it_is_said_once() -> None:
-    run = simulate(chain([0.0, 3.1, -3.1]))
-    assert run.remarks == ("l0 and l2 overlap at the start: links of one tree, they never touch",)
-    assert not (run.contacts.body_b >= 0).any()

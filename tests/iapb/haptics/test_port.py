@@ -10,7 +10,7 @@ import pytest
 
 from iapb.contact.laws import ImpulseAugmented
 from iapb.haptics.coupling import FourChannel, UnilateralCoupler
-from iapb.haptics.rendering import command, couple
+from iapb.haptics.rendering import couple
 from iapb.scene import Scene, find_scene, load_scene
 from iapb.system import System
 
@@ -77,17 +77,3 @@ def test_through_a_unilateral_coupler_the_hand_reaches_the_tool_only_as_long_as_
     couple(world, state, port)
     assert port.hand_force.any() and port.coupling_force.any() == engaged
     assert np.array_equal(port.applied, port.coupling_force if engaged else port.hand_force)
-
-
-def test_unilateral_actuators_give_the_coupler_alone_and_others_all_of_it() -> None:
-    for kind, share in ((FourChannel, 1.0), (UnilateralCoupler, 0.0)):
-        system, _, _, port = started(BEHIND.with_values({"device": None}), kind)
-        rng = np.random.default_rng(0)
-        tool = slice(*system.tool_dofs)
-        port.environment_force[:], port.coupling_force[:] = rng.normal(
-            size=(2, len(port.coupling_force))
-        )
-        command(port)
-        assert np.array_equal(
-            port.device_force, share * port.environment_force[tool] - port.coupling_force[tool]
-        )

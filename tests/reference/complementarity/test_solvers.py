@@ -23,7 +23,6 @@ from reference.complementarity import SOLVERS, ImpactProblem, Solution, solve, s
 from reference.complementarity.benchmark import run_solvers
 from reference.complementarity.solution import project_on_cone, residuals
 from reference.complementarity.solvers import SolverEntry
-from reference.complementarity.solvers.enumeration import all_solutions
 
 ROOT = Path(__file__).resolve().parents[3]
 # What each solver reaches on small redundant problems, relative velocity, with a factor ten of
@@ -60,14 +59,6 @@ def test_solvers_agree_with_enumeration_by_velocities(name: str) -> None:
         error = np.abs(solution.velocity_plus - truth).max() / np.abs(problem.velocity).max()
         assert error <= REACHED.get(name, 1e-10)
     assert failures <= FAILURES_ALLOWED
-
-
-def test_redundant_contacts_have_many_impulses_and_one_velocity() -> None:
-    """A block on two equal corners, each struck twice: impulses differ, velocities do not."""
-    rows = np.array([[1.0, 0.5], [1.0, -0.5], [1.0, 0.5], [1.0, -0.5]])
-    problem = ImpactProblem.from_impact(np.diag([1.0, 0.1]), rows, [-1.0, 0.2], 0.3)
-    velocities = [problem.velocity_plus(p) for p in all_solutions(problem)]
-    assert len(velocities) > 1 and max(np.abs(v - velocities[0]).max() for v in velocities) <= 1e-12
 
 
 @pytest.mark.parametrize(
@@ -251,17 +242,6 @@ def test_solvers_agree_on_random_problems(relaxed: bool) -> None:
             assert solution.solved(1e-5), (seed, solution.solver, solution.note, solution.residuals)
             if relaxed:  # convex: one velocity; Coulomb's law may have several
                 assert np.abs(solution.velocity_plus - solutions[0].velocity_plus).max() <= 1e-5
-
-
-def test_kinds_of_problems_are_refused_by_solvers_of_the_other_kind() -> None:
-    names = solver_names(mass_on_a_plane([1.0, 0.0, 0.0], 0.5))
-    assert names == CONE_SOLVERS
-    assert solve(mass_on_a_plane([-1.0, 0.0, 0.0], 0.5), "daqp").verdict() == "refused"
-    assert (
-        solve(mass_on_a_plane([-1.0, 1.0, 0.0], 0.5, relaxed=True), "pinocchio_pgs").verdict()
-        == "refused"
-    )
-    assert solve(ImpactProblem.from_delassus([[1.0]], [-1.0]), "nsgs").verdict() == "refused"
 
 
 @hypothesis_settings(max_examples=50)

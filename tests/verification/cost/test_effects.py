@@ -11,9 +11,7 @@ import pytest
 from iapb import find_scene, load_scene
 from iapb.scene import Scene, SpatialScene, scene_names
 from reference.worlds import find_world
-from tests.iapb.contact.paper import scene_of
 from verification.cost.effects import (
-    SAME,
     SWITCHED,
     Loop,
     effects_of,
@@ -74,25 +72,6 @@ def test_an_effect_that_does_nothing_leaves_the_same_bits(name: str) -> None:
         other.sample()
         assert all(getattr(other.simulation.world.switches, switch) for switch in switches)
         assert whole.same_motion(other), switches
-
-
-def test_a_wall_that_is_never_reached_changes_nothing() -> None:
-    """At 0.5 m/s the cart ends 50 mm before the wall."""
-    cart = {
-        "name": "cart",
-        "joint": "prismatic",
-        "axis": [1, 0],
-        "mass": 1.0,
-        "velocity": [0.5],
-        "shapes": [{"kind": "circle", "radius": 0.05}],
-    }
-    wall = {"name": "wall", "kind": "half_plane", "point": [0.2, 0], "normal": [-1, 0]}
-    contact = {"friction": 0.5, "stiffness": 1e3, "damping": 1}
-    scene = scene_of([cart], [wall], rate=500.0, duration=0.2, contact=contact)
-    found = {row["effect"]: row for row in effects_of(scene).records()}
-    for name in ("friction", "impulses", "penalty_stiffness", "contact_damping", "wall_contacts"):
-        assert found[name]["active"] and found[name]["without it"] == SAME
-    assert found["wall_contacts"]["position"] == 0.0
 
 
 def test_the_time_saved_is_measured_on_one_motion_beside_its_noise() -> None:
