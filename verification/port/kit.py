@@ -6,6 +6,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -14,16 +16,8 @@ from numpy.typing import ArrayLike
 from iapb.errors import ArgumentError
 from reference import Floats
 from verification.laws.bounds import Law, LawCount
-from verification.laws.child import Child, child_of
-from verification.laws.counterexample import (
-    HANGS,
-    import_line,
-    name_of,
-    residual_of,
-    shrink,
-    written,
-)
-from verification.laws.kit import CALL_LIMIT, PATIENCE, Report, laws_named
+from verification.laws.counterexample import import_line, name_of, residual_of, shrink, written
+from verification.laws.kit import PATIENCE, Report, laws_named
 from verification.port.device import BareDevice, Motion, Port, start_of, sums_of
 from verification.port.laws import FORCE_LAWS, Terms, smaller_motions
 from verification.port.search import LONG, Found, Goal, Search, edge_of
@@ -33,7 +27,6 @@ SLOW_CALLS = 30_000  # of the law in the search for slow hands
 STAGES = ("laws", "motions of the hand", "their improvement", "slow hands", "edge of the map")
 EDGE = 9  # points of the edge that are searched
 EDGE_CALLS = 25_000  # of the law for each of them
-REMEMBERS = ("repeatable", "waiting")  # laws whose counterexamples need a law without a past
 ENOUGH = 4  # motions that break the energy law, of which the shortest is shrunk
 SHRINKING = 5.0  # [s] for a counterexample
 
@@ -70,8 +63,7 @@ class ForceReport(Report):
     slow_damping : least b for hands without frequencies above `fastest` [Hz], measured; None
         without `fastest`.
     edge : (n, 2) points (b, f_c) on the edge of the passive set, if asked for.
-    found : the laws broken, each with a small motion, what the law did, and whether a fresh law did
-        it again (None: not tried).
+    found : the laws broken, each with a small motion, and what the law did if it gave no force.
     calls, seconds : calls of the law, and time.
     """
 
@@ -85,7 +77,7 @@ class ForceReport(Report):
     fastest: float | None = None
     slow_damping: float | None = None
     edge: Floats = field(default_factory=lambda: np.empty((0, 2)))
-    found: tuple[tuple[str, Motion, str, bool | None], ...] = ()
+    found: tuple[tuple[str, Motion, str], ...] = ()
     tested: Any = None
     calls: int = 0
     seconds: float = 0.0
@@ -137,9 +129,8 @@ class ForceReport(Report):
             lines.append(f"  {self.unfinished}")
         lines += [str(verdict) for verdict in self.verdicts]
         lines.append(f"  {self.calls:,} calls in {self.seconds:.1f} s, seed {self.seed}")
-        for law, motion, fault, fresh in self.found:
-            depends = ", which depends on earlier calls" if fresh is False else ""
-            title = f"counterexample to {law}{depends}, {len(motion.positions)} samples:"
+        for law, motion, fault in self.found:
+            title = f"counterexample to {law}, {len(motion.positions)} samples:"
             lines += ["", title, *([f"  {fault}"] if fault else []), "", "as a test:", ""]
             lines.append(self.test_of(law, motion))
         return "\n".join(lines)
@@ -156,8 +147,6 @@ def check_force(
     laws: Sequence[str] | None = None,
     seed: int = 0,
     patience: float = PATIENCE,
-    call_limit: float = CALL_LIMIT,
-    own_process: bool = False,
     edge: bool = False,
     effort: float = 1.0,
     progress: Callable[[int, int], None] | None = None,
@@ -178,7 +167,6 @@ def check_force(
     laws : names of the laws to judge; default: all.
     seed : of the search.
     patience : [s] after which the search ends; the report then fails and says so.
-    call_limit, own_process : as in `check_passivity`, for one motion.
     edge : also search the edge of the passive set in (b, f_c).
     effort : share of the calls of the law that the search makes.
     progress : called with (step, steps) of the search.
@@ -192,7 +180,7 @@ def check_force(
     ------
     ArgumentError
         The law is no function and has no `step`; a law's name is unknown; a coupled loop has
-        another rate than the device.
+        another rate than the device; `fastest` or `limit` is not above 0; `stored` is negative.
 
     Notes
     -----
@@ -211,21 +199,21 @@ def check_force(
         raise ArgumentError("law", law, "a function of (x, v), or an object with step(x, v)")
     if hasattr(law, "follow") and law.rate != device.rate:
         raise ArgumentError("rate", device.rate, f"{law.rate:g} Hz, the rate of the scene")
+    for name, value in (("fastest", fastest), ("limit", limit)):
+        if value is not None and not 0.0 < value < np.inf:
+            raise ArgumentError(name, value, "a finite number above 0, or None")
+    if not 0.0 <= stored < np.inf:
+        raise ArgumentError("stored", stored, "a finite number, 0 or more")
     at = start_of(start)
     port = Port(law, device, len(at))
-    terms = Terms(stored, limit)
     goals = Goal(None, device.friction), Goal(device.damping, None)
     rng = np.random.default_rng(seed)
-    with child_of(port.answer, call_limit, name_of(law)) as child:
-        if own_process and child is not None:
-            port.play = child
-        search = Search(port, at, stored, goals, rng, began + patience, effort=effort)
-        trial = _Trial(search, chosen, terms, child)
-        stages = trial.stages(fastest, edge)
-        for done, _ in enumerate(stages):
-            if progress is not None:
-                progress(done + 1, len(STAGES))
-        found = tuple(trial.counterexamples())
+    search = Search(port, at, stored, goals, rng, began + patience, effort=effort)
+    terms = Terms(stored, limit)
+    trial = _Trial(search, chosen, terms)
+    for done, _ in enumerate(trial.stages(fastest, edge)):
+        if progress is not None:
+            progress(done + 1, len(STAGES))
     late = search.late and not search.fault
     return ForceReport(
         name_of(law),
@@ -238,7 +226,7 @@ def check_force(
         fastest,
         trial.slow,
         trial.edge,
-        found,
+        tuple(trial.counterexamples()),
         law,
         port.calls,
         time.monotonic() - began,
@@ -249,13 +237,10 @@ def check_force(
 class _Trial:
     """One check: the search, the laws judged, their verdicts, and the numbers found so far."""
 
-    def __init__(
-        self, search: Search, laws: dict[str, Law], terms: Terms, child: Child | None
-    ) -> None:
+    def __init__(self, search: Search, laws: dict[str, Law], terms: Terms) -> None:
         self.search = search
         self.laws = laws
         self.terms = terms
-        self.child = child
         self.verdicts = {
             name: ForceVerdict(name, statement=own.statement) for name, own in laws.items()
         }
@@ -267,9 +252,7 @@ class _Trial:
     def stages(self, fastest: float | None, edge: bool) -> Iterator[None]:
         """Do the stages of the check, one at each step."""
         search = self.search
-        drawn = search.drawn()
-        for _ in range(MOTIONS):
-            family, motion = next(drawn)
+        for motion in islice(search.drawn(), MOTIONS):
             for name in self.laws:
                 self.judge(name, motion)
             if any(verdict.fault for verdict in self.verdicts.values()):
@@ -283,17 +266,15 @@ class _Trial:
         self.damping, self.friction = (one.needed for one in most)
         if search.unbounded(damping_goal, most[0]):
             self.damping = np.inf
-        yield
         judged = {"energy": most, "bounded": [search.largest], "finite": [search.motion_of_fault]}
         for name, ones in judged.items():
             for one in ones:
                 if one.motion is not None:
                     self.judge(name, one.motion)
+        yield
         if fastest is not None:
             slow = replace(search, goals=(damping_goal,), fastest=fastest, best={}, planes=[])
-            slow.look(SLOW_CALLS)
-            slow.improve(damping_goal)
-            self.slow = slow.confirmed(damping_goal).needed
+            self.slow = self.searched(slow, SLOW_CALLS).needed
         yield
         if edge:
             self.edge = self.edge_found()
@@ -304,32 +285,36 @@ class _Trial:
         self.search.improve(goal)
         return self.search.confirmed(goal)
 
+    def searched(self, search: Search, calls: int) -> Found:
+        """Do a search of its own for one goal; return the best."""
+        search.look(calls)
+        search.improve(search.goals[0])
+        return search.confirmed(search.goals[0])
+
     def edge_found(self) -> Floats:
         """Return points (b, f_c) of the edge, from 0 to beyond the device and its corner."""
-        search = self.search
         device = self.search.device
-        known = [one.motion for own in search.best.values() for one in own.values() if one.motion]
         corner = self.damping
         if not np.isfinite(corner):  # with twice the friction that a large damping leaves
-            corner = 0.0
-            for friction in (2.0, 1.0):
-                goal = Goal(None, friction * max(self.friction, device.friction))
-                corner = max(corner, self.known_best(goal, known).needed)
+            friction = max(self.friction, device.friction)
+            corner = max(self.known_best(Goal(None, k * friction)).needed for k in (2.0, 1.0))
         top = 2.0 * max(corner, device.damping, 1e-6)
         for damping in np.linspace(0.0, top, EDGE):
-            self.known_best(Goal(float(damping), None), known)
+            self.known_best(Goal(float(damping), None))
         dampings = np.linspace(0.0, top, 200)
-        return np.stack([dampings, edge_of(search.planes, dampings)], axis=1)
+        return np.stack([dampings, edge_of(self.search.planes, dampings)], axis=1)
 
-    def known_best(self, goal: Goal, known: list[Motion]) -> Found:
+    def known_best(self, goal: Goal) -> Found:
         """Search a goal, beginning with known motions."""
-        search = self.search
-        own = replace(search, goals=(goal,), best={}, longest=LONG)
-        for k, motion in enumerate(known):
-            own.try_on(motion, f"known {k}")
-        own.look(EDGE_CALLS)
-        own.improve(goal, 2)
-        return own.confirmed(goal)
+        own = replace(self.search, goals=(goal,), best={}, longest=LONG)
+        for motion in self.known():
+            own.try_on(motion)
+        return self.searched(own, EDGE_CALLS)
+
+    def known(self) -> list[Motion]:
+        """Return the best motions of all speeds for all goals."""
+        every = [one.motion for own in self.search.best.values() for one in own.values()]
+        return [motion for motion in every if motion is not None]
 
     def judge(self, name: str, motion: Motion) -> None:
         """Judge a law on a motion."""
@@ -343,62 +328,30 @@ class _Trial:
             verdict.motion = motion
             verdict.fault = fault
 
-    def counterexamples(self) -> Iterator[tuple[str, Motion, str, bool | None]]:
-        """Yield each broken law with a small motion, what the law did, and whether a fresh law does
-        it again."""
-        port = self.search.port
-        child = self.child
+    def counterexamples(self) -> Iterator[tuple[str, Motion, str]]:
+        """Yield each broken law with a small motion, and what the law did."""
         for name, verdict in self.verdicts.items():
             if verdict.motion is None:
                 continue
-            ends = time.monotonic() + SHRINKING
-            # a law that gives no answer in time is not asked again and again
-            hangs = verdict.fault.startswith(HANGS)
+            breaks = partial(self.breaks, name, time.monotonic() + SHRINKING)
+            motions = [verdict.motion, *(islice(self.shorter(breaks), ENOUGH) if name == "energy" else ())]
+            motion = shrink(min(motions, key=_samples), breaks, smaller_motions)
+            yield name, motion, verdict.fault
 
-            def breaks(motion: Motion, name: str = name, ends: float = ends) -> bool:
-                if time.monotonic() > ends:
-                    return False
-                if child is not None and name in REMEMBERS:
-                    child.restart()
-                    port.play = child
-                residual, _ = residual_of(self.laws[name], motion, port, self.terms)
-                return residual is not None and not residual.passed
+    def breaks(self, name: str, ends: float, motion: Motion) -> bool:
+        """Whether a motion breaks a law, found before a time."""
+        if time.monotonic() > ends:
+            return False
+        residual, _ = residual_of(self.laws[name], motion, self.search.port, self.terms)
+        return residual is not None and not residual.passed
 
-            motion = verdict.motion
-            if not hangs:
-                motion = shrink(
-                    min(self.breaking(name, breaks), key=_samples), breaks, smaller_motions
-                )
-            fresh = None
-            if child is not None:
-                child.restart()
-                own = port.play
-                port.play = child
-                fresh = hangs or breaks(motion, ends=np.inf)
-                port.play = own
-            yield (
-                name,
-                motion,
-                verdict.fault or (self.search.fault if name == "finite" else ""),
-                fresh,
-            )
-
-    def breaking(self, name: str, breaks: Callable[[Motion], bool]) -> list[Motion]:
-        """Return motions that break a law: the one known, and for energy the best of each family."""
-        first = self.verdicts[name].motion
-        known = [] if first is None else [first]
-        if name != "energy":
-            return known
-        every = [one for own in self.search.best.values() for one in own.values()]
-        for one in sorted(every, key=lambda one: one.motion is None or _samples(one.motion)):
-            for times in (1, 8, 64):
-                if one.motion is None or len(known) > ENOUGH:
-                    break
-                motion = replace(one.motion, repeats=times * one.motion.repeats)
-                if breaks(motion):
-                    known.append(self.cut(motion))
-                    break
-        return known
+    def shorter(self, breaks: Callable[[Motion], bool]) -> Iterator[Motion]:
+        """Yield a few short motions that draw energy."""
+        for motion in sorted(self.known(), key=_samples):
+            longer = (replace(motion, repeats=times * motion.repeats) for times in (1, 8, 64))
+            drawing = next(filter(breaks, longer), None)
+            if drawing is not None:
+                yield self.cut(drawing)
 
     def cut(self, motion: Motion) -> Motion:
         """Return the first samples of a motion, until the hand has drawn energy."""
@@ -406,10 +359,10 @@ class _Trial:
         device = self.search.device
         sums = sums_of(positions, self.search.port.forces(positions), device.dt)
         drawn = sums.drawn(device.damping, device.friction) > self.terms.stored
-        samples = 2 + int(np.argmax(drawn))
-        if samples <= len(motion.lead) + 1 + 2 * len(motion.cycle):
-            return Motion(motion.start, positions[1:samples], motion.cycle[:0], 0)
-        return replace(motion, repeats=-(-(samples - 1 - len(motion.lead)) // len(motion.cycle)))
+        samples = 1 + int(np.argmax(drawn))
+        if samples <= len(motion.lead) + 2 * len(motion.cycle):
+            return Motion(motion.start, positions[1 : samples + 1], motion.cycle[:0], 0)
+        return replace(motion, repeats=-(-(samples - len(motion.lead)) // len(motion.cycle)))
 
 
 def _samples(motion: Motion) -> int:

@@ -6,8 +6,8 @@ and asks for the least other one. Cycles count with the energy of one round once
 what the search returns was drawn from rest, in full.
 
 The search tries chatter between pairs of points that a slow scan finds steep, turns (sines and
-ellipses), ramps and reversals, random cycles and random motions; then it improves the best of each
-kind for each goal, with moves of points, scale, place, shape and speed.
+ellipses), polygons with ramps, and random motions; then it improves the best of each speed for each
+goal, with changes of its shape, place, speed and points.
 """
 
 from __future__ import annotations
@@ -19,44 +19,21 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from reference import Floats
 from verification.laws.resolver import ResolverFault
 from verification.port.device import BareDevice, Motion, Port, Sums, sums_of
 
-CALLS = 90_000  # of the law in the first round
-TRIES = 150  # moves of each improved motion
-CLIMB = 30_000  # calls of the law for these
+CALLS = 120_000  # of the law in the first round
+CLIMB = 40_000  # calls for each improved motion, and coordinate
 LEADS = (2, 10, 40, 200)  # samples of a lead-in
 HALVINGS = 30  # of a pair of points
+LASTS = 4  # times as long does a cycle last that is the best so far
 SETTLE = 60  # samples after which a cycle is measured
 LONG = 40_000  # samples of a motion that confirms a cycle, at first
-LONGEST = 1_500_000  # and at most, if that shows 0.2 % more
-PATIENT = 2.0  # [s] for such a motion
+LONGEST = 360_000  # and at most, if that shows 0.2 % more
 FINEST = 1e-7  # smallest size of a cycle, as a share of the reach
-PERIODS = (
-    2,
-    3,
-    4,
-    5,
-    6,
-    7,
-    8,
-    9,
-    10,
-    11,
-    13,
-    16,
-    20,
-    26,
-    36,
-    50,
-    72,
-    100,
-    150,
-)  # of turns [samples]
-SLOWEST = 1000  # samples of an improved cycle
+SLOWEST = 1000  # samples of a cycle of a hand of any speed
 SCAN = 400  # samples of a scan from end to end
 SLOWER = 6  # loops, each at half the speed of the one before, that show that no damping is enough
 SMALLER = 10  # the same for pairs of points, each half as far apart
@@ -70,23 +47,18 @@ class Goal(NamedTuple):
 
     def needed(self, sums: Sums, stored: float = 0.0) -> Floats:
         """Return what the motion needs by the end of each period (n,)."""
-        work = sums.work - sums.rounding - stored
-        if self.friction is not None:
-            return _over(work - self.friction * sums.rubbed, sums.damped)
-        return _over(work - (self.damping or 0.0) * sums.damped, sums.rubbed)
-
-
-def _over(above: Floats, below: Floats) -> Floats:
-    return np.divide(above, below, out=np.full_like(above, -np.inf), where=below > 0.0)
+        spared = sums.work - sums.rounding - stored
+        above = spared - (self.friction or 0.0) * sums.rubbed - (self.damping or 0.0) * sums.damped
+        below = sums.rubbed if self.friction is None else sums.damped
+        return np.divide(above, below, out=np.full_like(above, -np.inf), where=below > 0.0)
 
 
 @dataclass(frozen=True)
 class Found:
-    """A motion and what it needs of a goal; `family` is the kind of motion."""
+    """A motion and what it needs of a goal."""
 
     needed: float = -np.inf
     motion: Motion | None = None
-    family: str = ""
 
 
 @dataclass
@@ -94,7 +66,8 @@ class Search:
     """One search: the port, where it starts, how far the hand goes, and what was found.
 
     fastest : largest frequency of the hand [Hz]; the search then uses turns only
-    best : of each goal, and of each family the best motion
+    best : of each goal, and of each speed (0: no cycle; 2 or 3 samples: 2; 4 to 7: 3; …) the best
+        motion
     planes : (work, damped, rubbed) of motions from rest, less what was stored
     """
 
@@ -105,7 +78,7 @@ class Search:
     rng: np.random.Generator
     ends: float = np.inf
     fastest: float = np.inf
-    best: dict[Goal, dict[str, Found]] = field(default_factory=dict)
+    best: dict[Goal, dict[int, Found]] = field(default_factory=dict)
     planes: list[tuple[float, float, float]] = field(default_factory=list)
     largest: Found = field(default_factory=Found)  # the largest force [N]
     longest: int = LONGEST
@@ -124,15 +97,24 @@ class Search:
         return bool(self.fault) or time.monotonic() > self.ends
 
     @property
+    def slow(self) -> bool:
+        """Whether the hand is slow."""
+        return self.fastest < np.inf
+
+    @property
     def shortest(self) -> int:
         """Fewest samples in a turn of the hand."""
         return max(2, int(np.ceil(self.device.rate / self.fastest)))
 
-    def sums(self, motion: Motion) -> Sums | None:
-        """Play a motion; None if the law gave no usable answer."""
-        positions = motion.positions
+    @property
+    def slowest(self) -> int:
+        """Most samples in a cycle of the hand."""
+        return max(SLOWEST, 8 * self.shortest)
+
+    def forces(self, motion: Motion) -> Floats | None:
+        """Return the forces (n, d) in a motion; None if the law gave no usable answer."""
         try:
-            forces = self.port.forces(positions)
+            forces = self.port.forces(motion.positions)
         except ResolverFault as fault:
             if not self.fault:
                 self.fault = str(fault)
@@ -142,32 +124,41 @@ class Search:
             largest = float(np.linalg.norm(forces, axis=1).max())
         if largest > self.largest.needed:
             self.largest = Found(largest, motion)
-        return sums_of(positions, forces, self.device.dt)
+        return forces
 
-    def try_on(self, motion: Motion, family: str, goals: tuple[Goal, ...] = ()) -> list[float]:
-        """Play a motion and keep it where it is the best; return what it needs of each goal."""
+    def sums(self, motion: Motion) -> Sums | None:
+        """Play a motion; None if the law gave no usable answer."""
+        forces = self.forces(motion)
+        return None if forces is None else sums_of(motion.positions, forces, self.device.dt)
+
+    def try_on(self, motion: Motion, *goals: Goal) -> float:
+        """Play a motion and keep it where it is the best; return what it needs of the last goal."""
         sums = self.sums(motion)
-        if sums is None:
-            return [-np.inf for _ in goals]
-        found = []
+        speed = len(motion.cycle).bit_length()
+        value = -np.inf
         for goal in goals or self.goals:
+            of_goal = self.best.setdefault(goal, {})
+            best = of_goal.get(speed, Found()).needed
             value = self.value(goal, motion, sums)
-            family_best = self.best.setdefault(goal, {})
-            if value > family_best.get(family, Found()).needed:
-                family_best[family] = Found(value, motion, family)
-            found.append(value)
-        return found
+            if value > best and motion.repeats > 1:  # does it go on like that?
+                longer = replace(motion, repeats=LASTS * motion.repeats)
+                value = min(value, self.value(goal, longer, self.sums(longer)))
+            if value > best:
+                of_goal[speed] = Found(value, motion)
+        return value
 
-    def value(self, goal: Goal, motion: Motion, sums: Sums) -> float:
-        """Return what a motion needs from rest, or with LONGEST samples more of its last rounds."""
-        whole = -np.inf if self.smooth else float(goal.needed(sums, self.stored).max())
+    def value(self, goal: Goal, motion: Motion, sums: Sums | None) -> float:
+        """Return what a motion needs from rest, or with `longest` samples more of its last rounds; of
+        a slow hand what these rounds need."""
+        if sums is None:
+            return -np.inf
+        if self.slow:
+            return float(goal.needed(rounds_of(motion, sums))[0])
+        whole = float(goal.needed(sums, self.stored).max())
         if motion.repeats < 2:
             return whole
-        last = motion.repeats // 2 * len(motion.cycle)
-        rounds = Sums(*(one[-1:] - one[-1 - last] for one in sums))
-        if self.smooth:
-            return float(goal.needed(rounds)[0])
-        more = self.longest / last
+        rounds = rounds_of(motion, sums)
+        more = self.longest / (motion.repeats // 2 * len(motion.cycle))
         long = Sums(*(one[-1:] + more * own for one, own in zip(sums, rounds, strict=True)))
         return max(whole, float(goal.needed(long, self.stored)[0]))
 
@@ -175,7 +166,7 @@ class Search:
         """Return a motion with a cycle, inside the reach; `way`: samples of the lead-in."""
         cycle = np.clip(cycle - self.start, -self.device.reach, self.device.reach) + self.start
         way = way or int(self.rng.choice(LEADS))
-        if self.fastest < np.inf:
+        if self.slow:
             way = 2 * self.shortest
         share = np.sin(0.5 * np.pi * np.arange(1, way)[:, None] / way) ** 2
         lead = self.start + share * (cycle[0] - self.start)
@@ -187,13 +178,12 @@ class Search:
     def look(self, calls: int = CALLS) -> None:
         """Try every family until so many calls of the law are made."""
         last = self.port.calls + self.effort * calls
-        if self.fastest == np.inf:
-            for family, motion in itertools.chain(self.steep(), self.edges()):
-                self.try_on(motion, family)
-        for family, motion in self.drawn():
+        for motion in () if self.slow else self.steep():
+            self.try_on(motion)
+        for motion in self.drawn():
             if self.port.calls > last or self.late:
                 return
-            self.try_on(motion, family)
+            self.try_on(motion)
 
     def direction(self) -> Floats:
         """Return a random unit vector (d,), an axis in half of the draws."""
@@ -203,260 +193,188 @@ class Search:
             drawn = np.sign(drawn) * (np.arange(size) == self.rng.integers(size))
         return drawn / np.linalg.norm(drawn)
 
-    def steep(self) -> Iterator[tuple[str, Motion]]:
+    def steep(self) -> Iterator[Motion]:
         """Scan lines slowly; yield chatter between the pairs of points that need most."""
         size = len(self.start)
         reach = self.device.reach
-        lines = [*np.eye(size), *(self.direction() for _ in range(3 * (size - 1)))]
-        lags = np.array([2**k for k in range(int(np.log2(SCAN)))])
-        for line in lines:
-            ends = np.array([0.0, reach, -reach, 0.0])[:, None] * line + self.start
-            legs = [np.linspace(a, b, SCAN) for a, b in zip(ends[:-1], ends[1:], strict=True)]
-            scan = Motion(self.start, np.concatenate(legs), np.empty((0, size)), 0)
-            self.try_on(scan, "scan")
-            if self.late:
+        way = np.concatenate([np.linspace(0.0, reach, SCAN), np.linspace(reach, -reach, 2 * SCAN)])
+        for line in [*np.eye(size), *(self.direction() for _ in range(3 * (size - 1)))]:
+            scan = Motion(self.start, self.start + way[:, None] * line, np.empty((0, size)), 0)
+            self.try_on(scan)
+            force = self.forces(scan)
+            if force is None or self.late:
                 return
-            for at, force in self._legs(scan):
-                yield from self._pairs(at, force, line, lags)
+            at = scan.positions
+            for lag in 2 ** np.arange(int(np.log2(SCAN))):
+                far = at[lag:] - at[:-lag]
+                length = np.linalg.norm(far, axis=1)
+                rise = np.einsum("ij,ij->i", force[:-lag] - force[lag:], far)
+                pair = Sums(rise, 2.0 * length**2 / self.device.dt, 2.0 * length, 0.0 * rise)
+                for goal in self.goals:
+                    k = int(goal.needed(pair).argmax())
+                    yield self.motion(at[[k, k + lag]], 20)
 
-    def edges(self) -> Iterator[tuple[str, Motion]]:
-        """Yield chatter across the encoder's edges near the start, of many sizes."""
-        step = self.device.resolution
-        for k in range(4 if step > 0.0 else 0):
-            edge = self.start.copy()
-            edge[k % len(edge)] = (np.floor(edge[k % len(edge)] / step) + 0.5 + k) * step
-            for size in step * 10.0 ** -np.arange(0.3, 5.0, 0.5):
-                line = size * (np.arange(len(edge)) == k % len(edge))
-                yield "edge", self.motion(np.stack([edge + line, edge - line]), 40)
-
-    def _legs(self, scan: Motion) -> Iterator[tuple[Floats, Floats]]:
-        at = scan.positions
-        force = self.port.forces(at)
-        for k in range(3):
-            part = slice(1 + k * SCAN, 1 + (k + 1) * SCAN)
-            yield at[part], force[part]
-
-    def _pairs(
-        self, at: Floats, force: Floats, line: Floats, lags: NDArray[np.int64]
-    ) -> Iterator[tuple[str, Motion]]:
-        """Yield chatter between the steepest pairs of a leg, a few for each goal."""
-        first, second = np.concatenate(
-            [np.stack([np.arange(len(at) - lag), np.arange(lag, len(at))]) for lag in lags], axis=1
-        )
-        far = at[second] - at[first]
-        length = np.linalg.norm(far, axis=1)
-        rise = np.einsum("ij,ij->i", force[first] - force[second], far)
-        pair = Sums(rise, 2.0 * length**2 / self.device.dt, 2.0 * length, 0.0 * rise)
-        for goal in self.goals:
-            order = np.argsort(-goal.needed(pair))[:200]
-            for k in order[:: max(1, len(order) // 5)]:
-                yield "chatter", self.motion(np.stack([at[first[k]], at[second[k]]]), 20)
-
-    def place(self) -> Floats:
-        """Return a random place (d,), most often near the middle of an earlier find."""
+    def placed(self, shape: Floats) -> Floats:
+        """Return a shape (p, d) in a random size and place, often near an earlier find or an edge of
+        the encoder."""
+        rng = self.rng
         reach = self.device.reach
+        size = reach * 10.0 ** rng.uniform(-3.5, -0.1)
         known = [one.motion for found in self.best.values() for one in found.values()]
         cycles = [motion.cycle for motion in known if motion is not None and len(motion.cycle)]
-        if cycles and self.rng.random() < 0.5:
-            cycle = cycles[self.rng.integers(len(cycles))]
-            return cycle.mean(axis=0)
-        near = 10.0 ** self.rng.uniform(-4.0, 0.0) if self.rng.random() < 0.5 else 1.0
-        middle = self.start + near * self.rng.uniform(-reach, reach, len(self.start))
+        near = rng.choice([1.0, 10.0 ** rng.uniform(-4.0, 0.0)])
+        middle = near * rng.uniform(-reach, reach, len(self.start))
+        if cycles and rng.random() < 0.5:
+            middle = cycles[rng.integers(len(cycles))].mean(axis=0) - self.start
         step = self.device.resolution
-        if step > 0.0 and self.rng.random() < 0.5:  # an edge of the encoder
-            middle = (np.floor(middle / step) + 0.5) * step
-        return middle
+        if step > 0.0 and rng.random() < 0.5:
+            middle = (np.floor((middle + self.start) / step) + 0.5) * step - self.start
+        middle = np.clip(middle, size - reach, reach - size)
+        return self.start + middle + size / np.abs(shape).max() * shape
 
-    def size(self) -> float:
-        """Return a random size of a cycle [m]."""
-        return self.device.reach * float(10.0 ** self.rng.uniform(-3.5, -0.1))
-
-    def drawn(self) -> Iterator[tuple[str, Motion]]:
+    def drawn(self) -> Iterator[Motion]:
         """Yield random motions of every family for ever."""
-        k = 0
-        slow = self.fastest < np.inf
-        while True:
-            k += 1
-            yield f"turn {k % 4}", self.turn(k)
-            if slow:
-                continue
-            yield "reversal", self.reversal(k)
-            yield f"cycle {k % 3}", self.cycle(2 + k % 3 * 3 + int(self.rng.integers(3)))
-            if k % 3 == 0:
-                yield "walk", self.walk()
+        for k in itertools.count():
+            yield self.motion(self.placed(self.turn()))
+            if not self.slow:
+                yield self.motion(self.placed(self.ramps()))
+                yield self.motion(self.placed(self.polygon()))
+            if not self.slow and k % 3 == 0:
+                way = self.motion(self.placed(self.walk()))
+                yield Motion(self.start, way.cycle, way.cycle[:0], 0)
 
-    def turn(self, k: int) -> Motion:
+    def turn(self) -> Floats:
         """Return a sine, or an ellipse in more dimensions."""
-        wide = (300, 600, 1000) if len(self.start) > 1 else ()
-        periods = [p for p in (*PERIODS, *wide, 4 * self.shortest) if p >= self.shortest]
-        p = periods[k % len(periods)]
-        turns = 1 if self.smooth or p < 5 else int(self.rng.integers(1, 1 + p // 2))
-        turns = turns if self.rng.random() < 0.3 else 1
-        angle = 2.0 * np.pi * turns * np.arange(p)[:, None] / p + self.rng.uniform(0.0, 6.3)
-        middle = self.place()
-        size = self.size()
-        across = self.direction() * self.rng.choice([0.0, 1.0, self.rng.uniform()])
-        shape = np.cos(angle) * self.direction() + np.sin(angle) * across
-        size = min(size, self.room(middle))
-        return self.motion(middle + size * shape)
+        rng = self.rng
+        longest = self.slowest if len(self.start) > 1 or self.slow else 150
+        p = int(self.shortest * (longest / self.shortest) ** rng.random())
+        turns = 1 if self.slow or rng.random() < 0.7 else int(rng.integers(1, 1 + p // 2))
+        angle = 2.0 * np.pi * turns * np.arange(p)[:, None] / p + rng.uniform(0.0, 6.3)
+        across = self.direction() * rng.choice([0.0, 1.0, rng.uniform()])
+        return np.cos(angle) * self.direction() + np.sin(angle) * across
 
-    def room(self, middle: Floats) -> float:
-        """Return how far the hand can move from a place to all sides [m]."""
-        return max(self.device.reach - float(np.abs(middle - self.start).max()), 1e-3 * self.size())
-
-    def reversal(self, k: int) -> Motion:
+    def ramps(self) -> Floats:
         """Return a ramp to and fro of up to 12 samples each way, perhaps with rests at its ends."""
-        steps = 1 + k % 12
-        rest = int(self.rng.choice([0, 0, 1, 3]))
-        up = np.linspace(-1.0, 1.0, steps + 1)
-        shape = np.concatenate([up, np.repeat(up[-1:], rest), up[:0:-1], np.repeat(up[:1], rest)])
-        return self.motion(self.place() + self.size() * shape[:, None] * self.direction())
+        up = np.linspace(-1.0, 1.0, 2 + int(self.rng.integers(12)))
+        rest = np.ones(int(self.rng.choice([0, 0, 1, 3])))
+        return np.concatenate([up, rest, up[:0:-1], -rest])[:, None] * self.direction()
 
-    def cycle(self, p: int) -> Motion:
-        """Return a random closed polygon of p samples; in half of them the steps differ much."""
-        points = self.rng.normal(size=(p, len(self.start)))
-        if self.rng.random() < 0.5:
-            points = np.cumsum(points * 10.0 ** self.rng.uniform(-3.0, 0.0, (p, 1)), axis=0)
-        return self.motion(self.place() + self.size() * points)
+    def polygon(self) -> Floats:
+        """Return a random closed polygon; in half of them the steps differ much."""
+        rng = self.rng
+        points = rng.normal(size=(int(rng.integers(2, 11)), len(self.start)))
+        if rng.random() < 0.5:
+            points = np.cumsum(points * 10.0 ** rng.uniform(-3.0, 0.0, (len(points), 1)), axis=0)
+        return points
 
-    def walk(self) -> Motion:
-        """Return a random motion that does not close: a walk, rests and a sine."""
-        n = int(self.rng.integers(3, 150))
-        size = len(self.start)
-        moves = self.rng.normal(size=(n, size)) * (self.rng.random((n, 1)) < self.rng.uniform())
-        sine = np.sin(self.rng.uniform(0.0, np.pi) * np.arange(n))[:, None] * self.direction()
-        path = np.cumsum(moves, axis=0) / np.sqrt(n) + self.rng.choice([0.0, 1.0]) * sine
-        lead = self.start + self.size() * path
-        motion = self.motion(lead)
-        return Motion(self.start, motion.cycle, np.empty((0, size)), 0)
+    def walk(self) -> Floats:
+        """Return a random motion that does not close: a walk with rests, and perhaps a sine."""
+        rng = self.rng
+        n = int(rng.integers(3, 150))
+        moves = rng.normal(size=(n, len(self.start))) * (rng.random((n, 1)) < rng.uniform())
+        sine = np.sin(rng.uniform(0.0, np.pi) * np.arange(n))[:, None] * self.direction()
+        return np.cumsum(moves, axis=0) / np.sqrt(n) + rng.choice([0.1, 1.0]) * sine
 
     # improvement
 
-    def improve(self, goal: Goal, kinds: int = 3, tries: int = TRIES) -> None:
-        """Improve the best motions of some families for a goal."""
-        ranked = sorted(self.best.get(goal, {}).values(), key=lambda one: -one.needed)
-        cyclic = [one for one in ranked if one.motion is not None and len(one.motion.cycle)]
-        for one in cyclic[:kinds]:
-            self.corner(goal, one)
-            self.climb(goal, self.best[goal][one.family], tries)
+    def improve(self, goal: Goal) -> None:
+        """Improve the best cycles of some speeds for a goal, and then again the best of all."""
+        for rank in (0, 1, 2, 0):
+            cyclic = [one for one in self.ranked(goal) if one.motion and len(one.motion.cycle)]
+            for one in cyclic[rank : rank + 1]:
+                self.climb(goal, self.cornered(goal, one))
 
-    def corner(self, goal: Goal, one: Found) -> None:
+    def ranked(self, goal: Goal) -> list[Found]:
+        """Return the best motions of each speed for a goal, the best first."""
+        return sorted(self.best.get(goal, {}).values(), key=lambda one: -one.needed)
+
+    def cornered(self, goal: Goal, one: Found) -> Found:
         """Halve a pair of points as long as one half needs more: a step of the force is cornered."""
         for _ in range(HALVINGS):
-            family = one.family
-            needed = one.needed
-            if one.motion is None or len(one.motion.cycle) != 2 or needed <= 0.0 or self.late:
-                return
-            for half in halves_of(one.motion.cycle):
-                self.try_on(self.motion(half, len(one.motion.lead) + 1), family, (goal,))
-            one = self.best[goal][family]
-            if not one.needed > 1.0001 * needed:
-                return
+            if one.motion is None or len(one.motion.cycle) != 2 or self.late:
+                return one
+            halves = [self.motion(half) for half in halves_of(one.motion.cycle)]
+            values = [self.try_on(half, goal) for half in halves]
+            better = int(np.argmax(values))
+            if not values[better] > 1.0001 * max(one.needed, 0.0):
+                return one
+            one = Found(values[better], halves[better])
+        return one
 
-    def climb(self, goal: Goal, one: Found, tries: int) -> None:
+    def climb(self, goal: Goal, one: Found) -> None:
         """Change a cycle at random, and keep what needs more."""
         if one.motion is None:
             return
         best = one.motion
         value = one.needed
-        step = 0.3
         failed = 0
-        last = self.port.calls + self.effort * CLIMB
-        for _ in range(tries):
-            if self.late or failed > 30 or self.port.calls > last:
-                return
-            cycle = self.changed(best.cycle, step)
+        last = self.port.calls + self.effort * len(self.start) * CLIMB
+        while not (self.late or failed > 50 * len(self.start) or self.port.calls > last):
+            cycle = self.changed(best.cycle, 10.0 ** self.rng.uniform(-2.5, 0.0))
             if np.ptp(cycle, axis=0).max() < FINEST * self.device.reach:
                 continue
             way = 0 if self.rng.random() < 0.1 else len(best.lead) + 1
             tried = self.motion(cycle, way)
-            found = self.try_on(tried, one.family, (goal,))[0]
+            found = self.try_on(tried, goal)
+            failed = 0 if found > value * 1.0005 else failed + 1
             if found > value:
-                failed = 0 if found > value * 1.0005 else failed + 1
                 best = tried
                 value = found
-                step = min(1.0, 1.6 * step)
-            else:
-                failed = failed + 1
-                step = max(1e-3, 0.9 * step)
 
     def changed(self, cycle: Floats, step: float) -> Floats:
         """Return a cycle with one random change of a relative size."""
         rng = self.rng
-        p = len(cycle)
+        (p, size) = cycle.shape
         middle = cycle.mean(axis=0)
         spread = np.linalg.norm(cycle - middle, axis=1).max()
-        kind = int(rng.integers(6))
-        if kind == 0:
-            return middle + (cycle - middle) * float(np.exp(2.0 * step * rng.normal()))
-        if kind == 1:
-            return cycle + step * spread * rng.normal(size=len(middle))
-        if kind == 2 and not self.smooth:  # one step longer or shorter
-            k = int(rng.integers(1, p))
+        kind = int(rng.integers(1 - size, 4 if self.slow else 6))
+        if kind <= 0:  # larger, turned or bent
+            return middle + (cycle - middle) @ (np.eye(size) + step * rng.normal(size=(size, size)))
+        if kind == 1:  # elsewhere
+            return cycle + step * spread * rng.normal(size=size)
+        if kind == 2:  # slower or faster, perhaps of several rounds
+            cycle = np.tile(cycle, (1 if self.slow or p > 40 else rng.integers(1, 4), 1))
+            p = len(cycle)
+            other = rng.choice([p // 2, p - 1, p + 1, round(p * 1.2), round(p / 1.2), 2 * p])
+            return resampled(cycle, int(np.clip(other, self.shortest, self.slowest)))
+        if kind == 3:  # with a wave
+            turn = rng.integers(1, p // self.shortest + 1) * 2.0 * np.pi * np.arange(p)[:, None] / p
+            wave = np.cos(turn) * rng.normal(size=size) + np.sin(turn) * rng.normal(size=size)
+            return cycle + 0.5 * step * spread * wave
+        k = int(rng.integers(1, p))
+        if kind == 4:  # one step longer or shorter
             longer = float(np.exp(2.0 * rng.normal())) - 1.0
             return cycle + (np.arange(p) >= k)[:, None] * longer * (cycle[k] - cycle[k - 1])
-        if kind == 3:
-            other = self.shortest if self.fastest < np.inf else 2
-            rounds = int(rng.choice([1, 1, 2, 3])) if p < 40 and not self.smooth else 1
-            p = p * rounds
-            cycle = np.tile(cycle, (rounds, 1))
-            longer = rng.choice([p // 2, p - 1, p + 1, round(p * 1.2), round(p / 1.2), 2 * p])
-            return resampled(cycle, int(np.clip(longer, other, SLOWEST)), self.smooth)
-        if kind == 4 or self.smooth:
-            high = max(1, p // self.shortest) if self.smooth else int(rng.integers(1, p // 2 + 1))
-            turn = 2.0 * np.pi * high * np.arange(p)[:, None] / p
-            wave = np.cos(turn) * rng.normal(size=len(middle))
-            wave += np.sin(turn) * rng.normal(size=len(middle))
-            return cycle + 0.5 * step * spread * wave
-        moved = cycle.copy()
-        moved[rng.integers(p)] += step * spread * rng.normal(size=len(middle))
-        return moved
-
-    @property
-    def smooth(self) -> bool:
-        """Whether the hand is slow."""
-        return self.fastest < np.inf
+        return cycle + (np.arange(p) == k)[:, None] * step * spread * rng.normal(size=size)
 
     # what was found
 
     def confirmed(self, goal: Goal) -> Found:
         """Return the motion from rest that needs most: the best cycles are repeated for long."""
         best = Found(0.0)
-        ranked = sorted(self.best.get(goal, {}).values(), key=lambda one: -one.needed)
-        for one in ranked[:4]:
-            samples = round(self.effort * LONG)
-            while (
-                samples <= self.effort * self.longest
-                and one.needed > 1.002 * best.needed
-                and not self.late
-            ):
-                began = time.monotonic()
-                best = max(best, self.from_rest(goal, one, samples), key=lambda own: own.needed)
-                if one.motion is None or not len(one.motion.cycle) or self.smooth:
-                    break
-                if 3.0 * (time.monotonic() - began) > PATIENT:
-                    break
-                samples *= 3
+        for one in self.ranked(goal)[:4]:
+            for samples in (LONG, self.longest):
+                if one.needed > 1.002 * best.needed and not self.late:
+                    tried = self.from_rest(goal, one, round(self.effort * samples))
+                    best = max(best, tried, key=lambda own: own.needed)
         return best
 
     def from_rest(self, goal: Goal, one: Found, samples: int) -> Found:
         """Play a motion from rest for so many samples; return what it needs, and keep its
         half-plane."""
         motion = one.motion
-        if motion is None:
-            return Found()
-        if len(motion.cycle):
+        if motion is not None and len(motion.cycle):
             motion = replace(motion, repeats=8 + samples // len(motion.cycle))
-        sums = self.sums(motion)
-        if sums is None:
+        sums = None if motion is None else self.sums(motion)
+        if motion is None or sums is None:
             return Found()
-        if self.smooth:
-            return Found(self.value(goal, motion, sums), motion, one.family)
+        if self.slow:
+            return Found(self.value(goal, motion, sums), motion)
         needed = goal.needed(sums, self.stored)
         at = int(needed.argmax())
         work = float(sums.work[at] - sums.rounding[at] - self.stored)
         self.planes.append((work, float(sums.damped[at]), float(sums.rubbed[at])))
-        return Found(float(needed[at]), motion, one.family)
+        return Found(float(needed[at]), motion)
 
     def unbounded(self, goal: Goal, one: Found) -> bool:
         """Whether no damping is enough: a loop needs twice as much at each half of its speed, or
@@ -464,8 +382,8 @@ class Search:
         if one.motion is None or not len(one.motion.cycle):
             return False
         cycle = one.motion.cycle
-        loop = resampled(cycle, max(24, min(len(cycle), 48)), self.smooth)
-        slower = [resampled(loop, len(loop) * 2**k, self.smooth) for k in range(SLOWER)]
+        loop = resampled(cycle, int(np.clip(len(cycle), 24, 48)))
+        slower = [resampled(loop, len(loop) * 2**k) for k in range(SLOWER)]
         if _doubles([self.settled(goal, copy) for copy in slower]):
             return True
         pairs = [np.stack([a, b]) for a, b in zip(cycle, np.roll(cycle, 1, 0), strict=True)][:40]
@@ -475,15 +393,19 @@ class Search:
             best = int(np.argmax(values))
             found.append(values[best])
             pairs = halves_of(pairs[best])
-        return not self.smooth and _doubles(found)
+        return _doubles(found)
 
     def settled(self, goal: Goal, cycle: Floats) -> float:
         """Return what the last rounds of a cycle need, whatever came before."""
-        sums = self.sums(self.motion(cycle, 40))
-        if sums is None:
-            return -np.inf
-        half = (len(sums.work) - 40) // (2 * len(cycle)) * len(cycle)
-        return float(goal.needed(Sums(*(one[-1:] - one[-1 - half] for one in sums)))[0])
+        motion = self.motion(cycle, 40)
+        sums = self.sums(motion)
+        return -np.inf if sums is None else float(goal.needed(rounds_of(motion, sums))[0])
+
+
+def rounds_of(motion: Motion, sums: Sums) -> Sums:
+    """Return the sums (1,) of the second half of a motion's rounds."""
+    last = motion.repeats // 2 * len(motion.cycle)
+    return Sums(*(one[-1:] - one[-1 - last] for one in sums))
 
 
 def _doubles(needed: list[float]) -> bool:
@@ -498,17 +420,10 @@ def halves_of(pair: Floats) -> list[Floats]:
     return [np.stack([pair[0], middle]), np.stack([middle, pair[1]])]
 
 
-def resampled(cycle: Floats, p: int, smooth: bool = False) -> Floats:
-    """Return a cycle in p samples: between its points straight, or with no new frequencies."""
-    if p == len(cycle):
-        return cycle
-    if smooth:
-        lines = np.fft.rfft(cycle, axis=0)[: p // 2 + 1]
-        return np.fft.irfft(lines, p, axis=0) * (p / len(cycle))
-    at = np.arange(p) * len(cycle) / p
-    closed = np.concatenate([cycle, cycle[:1]])
-    whole = np.arange(len(closed))
-    return np.stack([np.interp(at, whole, closed[:, k]) for k in range(cycle.shape[1])], axis=1)
+def resampled(cycle: Floats, p: int) -> Floats:
+    """Return a cycle in p samples, with no new frequencies."""
+    lines = np.fft.rfft(cycle, axis=0)[: p // 2 + 1]
+    return np.fft.irfft(lines, p, axis=0) * (p / len(cycle))
 
 
 def edge_of(planes: list[tuple[float, float, float]], dampings: Floats) -> Floats:
