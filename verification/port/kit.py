@@ -23,17 +23,19 @@ from verification.port.laws import FORCE_LAWS, Terms, smaller_motions
 from verification.port.search import LONG, Found, Goal, Search, edge_of
 
 MOTIONS = 40  # for the laws other than energy
-SLOW_CALLS = 30_000  # of the law in the search for slow hands
+SLOW_EFFORT = 0.5  # of a whole search, in that for slow hands
 STAGES = ("laws", "motions of the hand", "their improvement", "slow hands", "edge of the map")
 EDGE = 9  # points of the edge that are searched
-EDGE_CALLS = 25_000  # of the law for each of them
+EDGE_EFFORT = 0.25  # of a whole search, for each of them
 ENOUGH = 4  # motions that break the energy law, of which the shortest is shrunk
 SHRINKING = 5.0  # [s] for a counterexample
 
 
 @dataclass
 class ForceVerdict(LawCount):
-    """Verdict on one law: `motion` is the first one that breaks it, `fault` what the law did then."""
+    """Verdict on one law: `motion` is the first one that breaks it, `fault` what the law did then.
+    A law that does not apply is printed with a dash.
+    """
 
     statement: str = ""
     motion: Motion | None = None
@@ -45,8 +47,9 @@ class ForceVerdict(LawCount):
         return self.failures == 0
 
     def __str__(self) -> str:
-        mark = "kept  " if self.passed else "BROKEN"
-        worst = f", worst {self.worst.words}" if self.worst else ""
+        kept = "kept  " if self.checked else "-     "
+        mark = kept if self.passed else "BROKEN"
+        worst = f", worst {self.worst.words}" if self.worst and self.worst.value > 0.0 else ""
         fault = f"\n         {self.fault}" if self.fault else ""
         return f"  {mark} {self.law}: {self.statement}{worst}{fault}"
 
@@ -273,8 +276,11 @@ class _Trial:
                     self.judge(name, one.motion)
         yield
         if fastest is not None:
-            slow = replace(search, goals=(damping_goal,), fastest=fastest, best={}, planes=[])
-            self.slow = self.searched(slow, SLOW_CALLS).needed
+            effort = SLOW_EFFORT * search.effort
+            slow = replace(
+                search, goals=(damping_goal,), fastest=fastest, best={}, planes=[], effort=effort
+            )
+            self.slow = self.searched(slow).needed
         yield
         if edge:
             self.edge = self.edge_found()
@@ -285,9 +291,9 @@ class _Trial:
         self.search.improve(goal)
         return self.search.confirmed(goal)
 
-    def searched(self, search: Search, calls: int) -> Found:
+    def searched(self, search: Search) -> Found:
         """Do a search of its own for one goal; return the best."""
-        search.look(calls)
+        search.look()
         search.improve(search.goals[0])
         return search.confirmed(search.goals[0])
 
@@ -306,10 +312,11 @@ class _Trial:
 
     def known_best(self, goal: Goal) -> Found:
         """Search a goal, beginning with known motions."""
-        own = replace(self.search, goals=(goal,), best={}, longest=LONG)
+        effort = EDGE_EFFORT * self.search.effort
+        own = replace(self.search, goals=(goal,), best={}, longest=LONG, effort=effort)
         for motion in self.known():
             own.try_on(motion)
-        return self.searched(own, EDGE_CALLS)
+        return self.searched(own)
 
     def known(self) -> list[Motion]:
         """Return the best motions of all speeds for all goals."""

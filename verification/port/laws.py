@@ -140,6 +140,8 @@ def smaller_motions(motion: Motion) -> Iterator[Motion]:
     for part in (slice(0, 0), slice(None, len(lead) // 2), slice(1, None, 2), slice(None, -1)):
         if len(lead[part]) < len(lead):
             yield replace(motion, lead=lead[part])
+    for k in range(min(len(lead), 12)):
+        yield replace(motion, lead=np.delete(lead, k, axis=0))
     for digits in (3, 4, 5, 6, 7, 8):
         for name in ("lead", "cycle", "start"):
             array = getattr(motion, name)

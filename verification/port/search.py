@@ -175,9 +175,9 @@ class Search:
 
     # the first round
 
-    def look(self, calls: int = CALLS) -> None:
-        """Try every family until so many calls of the law are made."""
-        last = self.port.calls + self.effort * calls
+    def look(self) -> None:
+        """Try motions of every kind until CALLS calls of the law are made."""
+        last = self.port.calls + self.effort * CALLS
         for motion in () if self.slow else self.steep():
             self.try_on(motion)
         for motion in self.drawn():
@@ -233,7 +233,7 @@ class Search:
         return self.start + middle + size / np.abs(shape).max() * shape
 
     def drawn(self) -> Iterator[Motion]:
-        """Yield random motions of every family for ever."""
+        """Yield random motions of every kind for ever."""
         for k in itertools.count():
             yield self.motion(self.placed(self.turn()))
             if not self.slow:

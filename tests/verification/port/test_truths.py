@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.verification.port import truths
-from tests.verification.port.truths import B, K, T
+from tests.verification.port.truths import JUMP, B, K, Linear, T
 from verification.port import BareDevice, check_force
 from verification.port.baselines.energy_bounding import EnergyBounding
 from verification.port.baselines.implicit_wall import ImplicitWall
@@ -15,66 +15,70 @@ from verification.port.baselines.midpoint_wall import MidpointWall
 from verification.port.baselines.penalty import PenaltyWall
 
 CLOSE = 0.99  # the bar of the search: at least this share of what is needed
-MISSED = 19  # the wall, in the plane, that the search brings to 0.987 only
+EXACT = 1.0005  # an actual motion never needs more; some truths are given to four digits
 IMPLICIT = 1.0 + (B + K * T) * T / 0.1
 HESSIAN = np.array([[1500.0, 400.0], [400.0, 900.0]])
+CURL = np.array([[K, 300.0], [-300.0, K]])
+WALL = Linear(K, B)
 
 
-def potential(x, v):
-    return -HESSIAN @ x
+def clamped(x, v):
+    return min(max(WALL.step(x, v), -5.0), 5.0)
 
 
-# law, device, least damping without friction
+def jump(x, v):
+    return -K * x - (JUMP if x > 0.00123 else 0.0)
+
+
+def dry_friction(x, v):
+    return -JUMP * np.sign(v)
+
+
+WALL.reset(T)
+# law, periods of delay, least damping without friction
 DAMPINGS = {
-    "spring": (truths.spring, {}, K * T / 2),
-    "spring and damper": (truths.damped, {}, K * T / 2 + B),
-    "one-sided": (truths.one_sided, {}, K * T / 2 + B),
-    "two periods late": (truths.spring, {"delay": 2}, 2.5 * K * T),
-    "late, with a damper": (truths.damped, {"delay": 1}, 3.250),
-    "four late, with a damper": (truths.damped, {"delay": 4}, 7.0),
-    "filter": (truths.Filtered, {}, K * T / 2 + B * T / (T + 6e-3)),
-    "every second period": (truths.Renewed, {}, K * T),
-    "potential": (potential, {"start": [0.0, 0.0]}, T / 2 * np.linalg.eigvalsh(HESSIAN)[-1]),
-    "impulse": (ImpulseWall(PenaltyWall(0.0), 2.0, 0.5), {}, 1.5 * 2.0 / (2.0 * T)),
-    "energy bounding": (EnergyBounding(PenaltyWall(K), 0.5), {}, 0.5),
-    "implicit": (ImplicitWall(K, B, 0.1), {}, (K * T / 2 + B + K * T) / IMPLICIT),
-    "midpoint": (MidpointWall(K), {}, K * T),
+    "spring": (Linear(), 0, K * T / 2),
+    "spring and damper": (WALL, 0, K * T / 2 + B),
+    "negative damper": (Linear(K, -B), 0, K * T / 2 + B),
+    "one-sided": (PenaltyWall(K, B), 0, K * T / 2 + B),
+    "clamped": (clamped, 0, K * T / 2 + B),
+    "two periods late": (Linear(), 2, 2.5 * K * T),
+    "late, with a damper": (WALL, 1, 3.250),
+    "two late, with a damper": (WALL, 2, 3.879),
+    "three late, with a damper": (WALL, 3, 5.080),
+    "four late, with a damper": (WALL, 4, 7.000),
+    "filter": (Linear(K, B, 3e-3), 0, K * T / 2 + B * T / (T + 6e-3)),
+    "every second period": (truths.Renewed, 0, K * T),
+    "potential": (Linear(HESSIAN), 0, T / 2 * np.linalg.eigvalsh(HESSIAN)[-1]),
+    "impulse": (ImpulseWall(PenaltyWall(0.0), 2.0, 0.5), 0, 1.5 * 2.0 / (2.0 * T)),
+    "energy bounding": (EnergyBounding(PenaltyWall(K), 0.5), 0, 0.5),
+    "implicit": (ImplicitWall(K, B, 0.1), 0, (K * T / 2 + B + K * T) / IMPLICIT),
+    "midpoint": (MidpointWall(K), 0, K * T),
+}
+FRICTIONS = {  # law, resolution, damping, least friction
+    "spring": (Linear(), 5e-5, K * T / 2, K * 5e-5 / 2),
+    "damper": (WALL, 5e-5, K * T / 2 + B, K * 5e-5 / 2 + B * 5e-5 / T),
+    "jump": (jump, 0.0, K * T / 2, JUMP / 2),
+    "dry friction": (dry_friction, 0.0, 0.5, JUMP),
 }
 
 
-def found(law, device, effort=1.0, **options):
-    start = options.pop("start", 0.0)
-    return check_force(
-        law, BareDevice(**device), start=start, laws=["energy"], effort=effort, **options
-    )
+def energy(law, device, **options):
+    plane = np.ndim(getattr(law, "stiffness", 0.0))
+    return check_force(law, device, start=[0.0, 0.0] if plane else 0.0, laws=["energy"], **options)
 
 
 @pytest.mark.parametrize("name", DAMPINGS)
 def test_the_damping_that_is_found_is_the_damping_that_is_needed(name):
-    law, options, need = DAMPINGS[name]
-    start = options.get("start", 0.0)
-    device = {key: value for key, value in options.items() if key != "start"}
-    report = found(law, device, 0.5, start=start)
-    # 3.250 and 7.0 are given to four digits; an actual motion never needs more than the truth
-    assert CLOSE * need <= report.damping_needed <= 1.0005 * need
+    law, delay, need = DAMPINGS[name]
+    assert CLOSE * need <= energy(law, BareDevice(delay=delay)).damping_needed <= EXACT * need
 
 
-@pytest.mark.parametrize(
-    ("law", "device", "need"),
-    [
-        (truths.spring, {"damping": K * T / 2, "resolution": 5e-5}, K * 5e-5 / 2),
-        (
-            truths.damped,
-            {"damping": K * T / 2 + B, "resolution": 5e-5},
-            K * 5e-5 / 2 + B * 5e-5 / T,
-        ),
-        (truths.jump, {"damping": K * T / 2}, truths.JUMP / 2),
-        (truths.dry_friction, {"damping": 0.5}, truths.JUMP),
-    ],
-)
-def test_the_friction_that_is_found_is_the_friction_that_is_needed(law, device, need):
-    report = found(law, device)
-    assert CLOSE * need <= report.friction_needed <= 1.0005 * need
+@pytest.mark.parametrize("name", FRICTIONS)
+def test_the_friction_that_is_found_is_the_friction_that_is_needed(name):
+    law, resolution, damping, need = FRICTIONS[name]
+    report = energy(law, BareDevice(damping=damping, resolution=resolution))
+    assert CLOSE * need <= report.friction_needed <= EXACT * need
     assert report.damping_needed == np.inf  # without friction no damping is enough
 
 
@@ -82,54 +86,36 @@ def test_the_friction_that_is_found_is_the_friction_that_is_needed(law, device, 
 @pytest.mark.parametrize("p", [4, 12])
 def test_a_curl_needs_more_damping_the_slower_its_loop(p):
     """KT/2 + (cT/2) cot(π/p) for p samples, so no damping is enough."""
-    c = 300.0
-    report = found(
-        lambda x, v: np.array([-K * x[0] - c * x[1], c * x[0] - K * x[1]]), {}, start=[0, 0]
-    )
-    need = K * T / 2 + c * T / 2 / np.tan(np.pi / p)
-    assert report.damping_needed == np.inf > need
-    slow = check_force(
-        lambda x, v: np.array([-K * x[0] - c * x[1], c * x[0] - K * x[1]]),
-        BareDevice(damping=1.05 * need),
-        start=[0.0, 0.0],
-        laws=["energy"],
-    )
-    assert not slow.passed
+    need = K * T / 2 + CURL[0, 1] * T / 2 / np.tan(np.pi / p)
+    assert energy(Linear(CURL), BareDevice()).damping_needed == np.inf
+    assert not energy(Linear(CURL), BareDevice(damping=1.05 * need)).passed
+
+
+def judged(law, device, k, **options):
+    """The ratio of what is found to what is needed; at 1.001 of it there must be no alarm."""
+    need = max(law.need(device), 0.0)
+    found = energy(law, device, **options).damping_needed
+    assert energy(law, replace(device, damping=1.001 * need), seed=k, **options).passed
+    return found / need if need else 1.0 + found
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("k", range(30))
+@pytest.mark.parametrize("k", range(60))
 def test_random_linear_walls(k):
-    law, device = truths.random_wall(k)
-    start = [0.0, 0.0] if np.ndim(law.stiffness) else 0.0
-    need = law.need(device)
-    report = check_force(law, device, start=start, laws=["energy"])
-    assert report.damping_needed <= 1.0005 * max(need, 0.0)
-    alarm = replace(device, damping=1.001 * max(need, 0.0))
-    assert check_force(law, alarm, start=start, laws=["energy"], seed=k).passed
-    if k == MISSED and 0.95 * need <= report.damping_needed < CLOSE * need:
-        pytest.xfail("the search falls short of the bar on this wall")
-    assert report.damping_needed >= CLOSE * need
+    assert CLOSE <= judged(*truths.random_wall(k), k) <= EXACT
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("k", range(20))
+@pytest.mark.parametrize("k", range(40))
 def test_random_force_tables(k):
     law, device = truths.random_table(k)
-    need = law.need(device)
-    options = {"laws": ["energy"], "stored": law.stored}
-    report = check_force(law, device, **options)
-    assert CLOSE * need <= report.damping_needed <= 1.0005 * need
-    alarm = replace(device, damping=1.001 * need)
-    assert check_force(law, alarm, seed=k, **options).passed
+    assert CLOSE <= judged(law, device, k, stored=law.stored) <= EXACT
 
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("k", range(30))
 def test_random_rounded_walls(k):
     law, device = truths.random_rounded(k)
-    b, f = law.needs(device)
-    enough = replace(device, damping=1.02 * b, friction=1.02 * f)
-    assert check_force(law, enough, laws=["energy"], seed=k).passed
-    little = replace(device, damping=0.9 * b, friction=0.9 * f)
-    assert not check_force(law, little, laws=["energy"], seed=k).passed
+    for share, passes in ((1.02, True), (0.9, False)):
+        own = replace(device, damping=share * device.damping, friction=share * device.friction)
+        assert energy(law, own, seed=k).passed is passes
