@@ -78,6 +78,7 @@ def here(tmp_path, monkeypatch):
         "own_number.py": "f = 3",
         "own_syntax.py": "def f(:",
         "own_fault.py": "f = 1 / 0",
+        "own_wall.py": "def f(x, v):\n    return -min(3e3 * x, 5.0) if x > 0.0 else 0.0",
         "two.yaml": STUDY,
         "given/two.lcp": "2\n2 1\n1 2\n-5 -6\n",
         "given/bad.lcp": "2\nno number\n",
@@ -170,6 +171,16 @@ REFUSED = [  # status, command line, what the refusal says
         "effects peg_corner --measure --world ideal",
         "--measure needs a world of the compiled engine",
     ),
+    *(
+        (1, f"port json:dumps {words}", said)
+        for words, said in (
+            ("--rate 0", "rate = 0.0: expected a finite number above 0"),
+            ("--start 0;1", "--start = '0;1': expected a number, or two or three"),
+            ("--stored -1", "stored = -1.0: expected a finite number, 0 or more"),
+            ("--fastest 0", "fastest = 0.0: expected a finite number above 0"),
+        )
+    ),
+    (1, "port own_number:f", "law = 3: expected a function of (x, v)"),
     (1, "verify --resolver nothing", "package.module:function"),
     (1, "verify --resolver no_such:f", "can be imported"),
     (
@@ -227,6 +238,7 @@ JSON = {  # of each row in the documents: the status, and a command
     "solvers": (0, "solvers given"),
     "verify": (0, "verify --impacts 20 --laws kinetic_energy"),
     "verify-many": (1, f"verify-many --impacts 20 --workers 1 --resolver {WRONG}"),
+    "port": (1, "port own_wall:f --damping 1.52 --limit 4 --start -0.001 --reach 0.005 --seed 1"),
     "prove": (0, "prove theorem_1"),
     "reproduce --figure": (0, "reproduce --figure fig02 --out figures"),
 }
@@ -284,6 +296,7 @@ def test_json_has_the_keys_that_the_documents_list_and_an_error_is_an_object_too
     assert found["verify"]["passed"] and [one["law"] for one in found["verify"]["laws"]] == [
         "kinetic_energy"
     ]
+    assert found["port"]["broken_laws"] == ["bounded"] and Path(found["port"]["map"]).is_file()
     assert [one["verdict"] for one in found["prove"]["statements"]] == ["proved"]
     drawings = found["reproduce --figure"]["drawings"]
     assert drawings and all(Path(each).is_file() for each in drawings)

@@ -382,14 +382,15 @@ def _repeating(earlier: Sequence[bytes]) -> Iterator[str]:
 
 
 def import_line(resolver: Any) -> str:
-    """Return the lines that import `resolver`; empty for a lambda or another function that cannot
-    be imported."""
+    """Return the lines that import `resolver`; empty for a lambda or another object that cannot be
+    imported."""
     inner = resolver.func if isinstance(resolver, partial) and not resolver.args else resolver
     module = getattr(inner, "__module__", None)
-    name = getattr(inner, "__qualname__", "")
     if not isinstance(module, str) or module == "__main__":
         return ""
-    if getattr(sys.modules.get(module), name, None) is not inner:
+    there = vars(sys.modules[module]) if module in sys.modules else {}
+    name = next((name for name, value in there.items() if value is inner), "")
+    if not name:
         return ""
     if inner is resolver:
         return f"from {module} import {name} as resolver"
@@ -404,7 +405,9 @@ def name_of(resolver: Any, word: str = "") -> str:
         options = ", ".join(f"{key}={value!r}" for key, value in resolver.keywords.items())
         name = getattr(resolver.func, "__name__", repr(resolver.func))
         return f"{word}({name}, {options})" if word else f"{name}({options})"
-    return getattr(resolver, "__qualname__", None) or repr(resolver)
+    kind = type(resolver)
+    plain = kind.__qualname__ if kind.__repr__ is object.__repr__ else repr(resolver)
+    return getattr(resolver, "__qualname__", None) or plain
 
 
 def written(array: np.ndarray) -> str:

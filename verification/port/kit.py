@@ -115,19 +115,11 @@ class ForceReport(Report):
     def _text(self) -> str:
         device = self.device
         word = "passed" if self.passed else "NOT FINISHED" if not self.broken_laws else "FAILED"
-        enough = f"{self.damping_needed:.4g} N s/m"
-        if self.damping_needed == np.inf:
-            enough = "more than any damping"
         lines = [
             f"{self.law}: {word} on a device of {device.damping:g} N s/m and {device.friction:g} N "
             f"at {device.rate:g} Hz",
-            f"  any hand: it needs {enough} (with {device.friction:g} N of friction),",
-            f"            or {self.friction_needed:.4g} N of friction (with {device.damping:g} N s/m)",
+            *(self._no_force() if "finite" in self.broken_laws else self._needs()),
         ]
-        if self.slow_damping is not None:
-            lines.append(
-                f"  hands slower than {self.fastest:g} Hz: {self.slow_damping:.4g} N s/m (measured)"
-            )
         if self.unfinished:
             lines.append(f"  {self.unfinished}")
         lines += [str(verdict) for verdict in self.verdicts]
@@ -137,6 +129,21 @@ class ForceReport(Report):
             lines += ["", title, *([f"  {fault}"] if fault else []), "", "as a test:", ""]
             lines.append(self.test_of(law, motion))
         return "\n".join(lines)
+
+    def _needs(self) -> Iterator[str]:
+        device = self.device
+        enough = f"{self.damping_needed:.4g} N s/m"
+        if self.damping_needed == np.inf:
+            enough = "more than any damping"
+        yield f"  any hand: it needs {enough} (with {device.friction:g} N of friction),"
+        yield f"            or {self.friction_needed:.4g} N of friction (with {device.damping:g} N s/m)"
+        if self.slow_damping is not None:
+            yield f"  hands slower than {self.fastest:g} Hz: {self.slow_damping:.4g} N s/m (measured)"
+
+    def _no_force(self) -> Iterator[str]:
+        size = len(self.found[0][1].start)
+        given = "numbers" if size == 1 else f"arrays ({size},)"
+        yield f"  it gave no force, so the search ended; x and v were {given}, like the start"
 
 
 def check_force(

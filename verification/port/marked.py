@@ -21,7 +21,8 @@ def laws_of(asked: dict[str, Any]) -> Iterable[str]:
 
 def judged(subject: Any, law: str, impacts: int, asked: dict[str, Any]) -> Report:
     """Judge one law as a marker asks."""
-    options = asked | {"laws": [law]}
+    options = {"impacts": impacts} | asked | {"laws": [law]}
     if "device" in asked:
+        del options["impacts"]
         return check_force(subject, **options)
-    return check_passivity(subject, **{"impacts": impacts} | options)
+    return check_passivity(subject, **options)

@@ -94,20 +94,27 @@ class Lagging:
         return self.force
 
 
-class EverySecond:
+class Counting:
+    """A law of the number k of the sample."""
+
+    force = 0.0
+
+    def reset(self):
+        self.k = -1
+
+    def step(self, x, v):
+        self.k += 1
+        self.force = self.at(x, v)
+        return self.force
+
+
+class EverySecond(Counting):
     """Renewed every second period."""
 
     every = 2
 
-    def reset(self):
-        self.k = 0
-        self.force = 0.0
-
-    def step(self, x, v):
-        if self.k % self.every == 0:
-            self.force = wall(x, v)
-        self.k += 1
-        return self.force
+    def at(self, x, v):
+        return self.force if self.k % self.every else wall(x, v)
 
 
 class EveryFifth(EverySecond):
@@ -149,16 +156,11 @@ class StifferAfterDeep:
         return wall(x, v, stiffness=K * (1.2 if x < 0.8 * self.deepest else 1.0))
 
 
-class Vibrates:
-    """Vibrates at 100 Hz once the wall is touched."""
+class Vibrates(Counting):
+    """Vibrates at 100 Hz where it is stiff."""
 
-    def reset(self, dt):
-        self.dt = dt
-        self.k = 0
-
-    def step(self, x, v):
-        self.k += x > 0.0
-        return wall(x, v) + 0.3 * np.sin(2.0 * np.pi * 100.0 * self.dt * self.k)
+    def at(self, x, v):
+        return wall(x, v) + (0.3 * np.sin(0.2 * np.pi * self.k) if x > 0.0 else 0.0)
 
 
 class FreeTool:
@@ -180,25 +182,17 @@ class FreeTool:
         return -pull
 
 
-class Drifts:
+class Drifts(Counting):
     """Drifts with time."""
 
-    def reset(self):
-        self.k = 0
-
-    def step(self, x, v):
-        self.k += 1
+    def at(self, x, v):
         return wall(x, v) * (1.0 + 1e-6 * self.k)
 
 
-class LosesASample:
+class LosesASample(Counting):
     """Gives no force at every 64th sample."""
 
-    def reset(self):
-        self.k = 0
-
-    def step(self, x, v):
-        self.k += 1
+    def at(self, x, v):
         return wall(x, v) if self.k % 64 else 0.0
 
 
@@ -207,25 +201,18 @@ class NoisyDamper:
 
     rng = np.random.default_rng(0)
 
-    def reset(self):
-        pass
-
     def step(self, x, v):
         return wall(x, v) * (1.0 + 1e-9 * self.rng.normal())
 
 
 class NeverForgets:
-    """A warm start that the reset forgets to clear."""
+    """A warm start that is never cleared."""
 
     last = 0.0
 
-    def reset(self):
-        pass
-
     def step(self, x, v):
-        force = wall(x, v) + 1e-12 * NeverForgets.last
-        NeverForgets.last = force
-        return force
+        NeverForgets.last = wall(x, v) + 1e-12 * NeverForgets.last
+        return NeverForgets.last
 
 
 class ImpulseAsForce:
@@ -241,7 +228,7 @@ class ImpulseAsForce:
 
 
 def above_the_limit(x, v):
-    return wall(x, v)
+    return wall(x, 0.0)
 
 
 def changes_position(x, v):

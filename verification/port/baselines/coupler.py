@@ -2,7 +2,7 @@
 the tool touches or the device is inside; otherwise the tool follows the device.
 
 Section VI of the paper, after J. E. Colgate, M. C. Stanley, J. M. Brown, "Issues in the haptic display of
-tool use", IROS 1995. `CoupledLoop` runs the same scene in the engine; this is its arithmetic for one
+tool use", IROS 1995, 140-145. `CoupledLoop` runs the same scene in the engine; this is its arithmetic for one
 coordinate, a thousand times as fast. A tool that lets go of the device's velocity costs the hand nothing,
 so its kinetic energy is a gift.
 """

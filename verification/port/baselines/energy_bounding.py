@@ -1,6 +1,6 @@
 """A wall whose force is bounded by the energy that its device dissipates: after J.-P. Kim, J. Ryu,
 "Robustly stable haptic interaction control using an energy-bounding algorithm", International Journal
-of Robotics Research 29(6), 2010. The bound is written here for one period.
+of Robotics Research, 2010. The bound is written here for one period.
 
 In a period the hand draws at most max over Δx of FΔx − bΔx²/T = F²T/4b. With |F| ≤ √(4bE/T) that
 is at most the energy E in store, so the law needs its own b, and no more.

@@ -1,5 +1,5 @@
 """A wall integrated by backward Euler together with the device's mass: D. Baraff, A. Witkin, "Large
-steps in cloth simulation", SIGGRAPH 1998, for one contact.
+steps in cloth simulation", SIGGRAPH 1998, 43-54, for one contact.
 
 F = −K x⁺ − B v⁺ with v⁺ = v + T F/m and x⁺ = x + T v⁺ gives F = −K′x − B′v with
 K′ = K/(1 + BT/m + KT²/m) and B′ = (B + KT) K′/K. At the port it needs K′T/2 + B′.

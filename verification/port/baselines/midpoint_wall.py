@@ -1,6 +1,6 @@
 """A spring that is evaluated half a period ahead, which removes the energy of a sampled spring in
-uniform motion: R. E. Ellis, N. Sarkar, M. A. Jenkins, "Numerical methods for the force reflection of
-contact", Journal of Dynamic Systems, Measurement, and Control 119(4), 1997.
+uniform motion: the half-sample prediction of R. B. Gillespie, M. R. Cutkosky, "Stable user-specific
+haptic rendering of the virtual wall", ASME IMECE, DSC-Vol. 58, 397-406, 1996.
 
 F = −K′(x + vT/2) is a spring with the damping K′T/2, so at the port it needs K′T. With the implicit
 midpoint rule for the device's mass, K′ = K/(1 + KT²/4m).

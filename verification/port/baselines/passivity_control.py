@@ -1,11 +1,9 @@
 """Time-domain passivity control of a wall: B. Hannaford, J.-H. Ryu, "Time-domain passivity control of
-haptic interfaces", IEEE Transactions on Robotics and Automation 18(1), 2002.
+haptic interfaces", IEEE Transactions on Robotics and Automation 18(1), 1-10, 2002.
 
-The observer sums the energy that the force gave in each period, from the motion that the next sample
-shows: J.-H. Ryu and others, "Sampled- and continuous-time passivity and stability of virtual
-environments", IEEE Transactions on Robotics 20(4), 2004. If the sum is negative, a damper shall take
-back what is missing. It acts one period after the motion that sizes it, so a quick move after a
-slow one draws more than was missing.
+The observer sums the energy that the held force gave in each period, from the motion that the next
+sample shows. If the sum is negative, a damper shall take back what is missing. It acts one period
+after the motion that sizes it, so a quick move after a slow one draws more than was missing.
 """
 
 from __future__ import annotations
@@ -16,7 +14,7 @@ from typing import Any
 
 @dataclass
 class PassivityControl:
-    """The controller of section III of Hannaford and Ryu, around a wall with `step(x, v)`.
+    """The series controller of Hannaford and Ryu, around a wall with `step(x, v)`.
 
     most : largest damping of the controller [N s/m].
     """

@@ -1,7 +1,7 @@
 """A wall of spring and damper that only pushes: equation (5) of the paper, clamped.
 
-Its need is KT/2 + B: J. E. Colgate, G. Schenkel, "Passivity of a class of sampled-data systems",
-Journal of Robotic Systems 14(1), 1997.
+Its need is KT/2 + B: J. E. Colgate, G. Schenkel, "Passivity of a class of sampled-data systems:
+application to haptic interfaces", Journal of Robotic Systems 14(1), 37-47, 1997.
 """
 
 from __future__ import annotations
