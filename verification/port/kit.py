@@ -348,7 +348,9 @@ class _Trial:
             if verdict.motion is None:
                 continue
             breaks = partial(self.breaks, name, time.monotonic() + SHRINKING)
-            motions = [verdict.motion, *(islice(self.shorter(breaks), ENOUGH) if name == "energy" else ())]
+            motions = [verdict.motion]
+            if name == "energy":
+                motions += islice(self.shorter(breaks), ENOUGH)
             motion = shrink(min(motions, key=_samples), breaks, smaller_motions)
             yield name, motion, verdict.fault
 

@@ -212,7 +212,7 @@ class Search:
                 pair = Sums(rise, 2.0 * length**2 / self.device.dt, 2.0 * length, 0.0 * rise)
                 for goal in self.goals:
                     k = int(goal.needed(pair).argmax())
-                    yield self.motion(at[[k, k + lag]], 20)
+                    yield self.motion(at[k : k + lag + 1 : lag], 20)
 
     def placed(self, shape: Floats) -> Floats:
         """Return a shape (p, d) in a random size and place, often near an earlier find or an edge of
@@ -333,7 +333,7 @@ class Search:
         if kind == 1:  # elsewhere
             return cycle + step * spread * rng.normal(size=size)
         if kind == 2:  # slower or faster, perhaps of several rounds
-            cycle = np.tile(cycle, (1 if self.slow or p > 40 else rng.integers(1, 4), 1))
+            cycle = np.tile(cycle, (1 if self.slow or p > 40 else int(rng.integers(1, 4)), 1))
             p = len(cycle)
             other = rng.choice([p // 2, p - 1, p + 1, round(p * 1.2), round(p / 1.2), 2 * p])
             return resampled(cycle, int(np.clip(other, self.shortest, self.slowest)))
