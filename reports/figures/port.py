@@ -75,7 +75,7 @@ def port_map(table: Table) -> Drawn:
     rows = table.records()
     names = list(dict.fromkeys(row["law"] for row in rows))
     others = iter(CYCLE[1:])
-    looks = {name: replace(STYLES.get(name) or next(others), marker="") for name in names}
+    looks = {name: STYLES.get(name) or next(others) for name in names}
     edges = {
         name: np.array(table.where(law=name).select(("damping", "friction")).rows) for name in names
     }
