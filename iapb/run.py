@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from hashlib import blake2b
-from html import escape
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -290,25 +289,6 @@ class Run:
         deepest = max(0.0, -float(self.contacts.gap.min(initial=0.0)))
         return (
             f"{done}, {len(self.impacts.step)} impacts, penetration at most {1e3 * deepest:.3g} mm"
-        )
-
-    def _repr_html_(self) -> str:
-        """The summary and the last state as a small table, for notebooks."""
-        rows = "".join(
-            f"<tr><td>{escape(name)}</td><td>{value:.6g}</td><td>{unit}</td></tr>"
-            for name, value, unit in list(
-                zip(self.coordinate_names, self.q[-1], self.coordinate_units, strict=True)
-            )[:_SHOWN]
-        )
-        more = len(self.coordinate_names) - _SHOWN
-        rest = f"<p>and {more} more coordinates</p>" if more > 0 else ""
-        doubts = "".join(
-            f"<p><b>Not to be trusted, because {escape(why)}.</b></p>" for why in self.distrust
-        )
-        return (
-            f"<p>{escape(self.summary)}</p>{doubts}<table><tr><th>at the "
-            f"end</th><th>value</th><th>unit</th></tr>"
-            f"{rows}</table>{rest}"
         )
 
     def to_xarray(self) -> Any:

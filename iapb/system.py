@@ -325,17 +325,13 @@ class System:
         port.device_q[:] = port.sensed_q[:] = port.measured_q[:] = self.start[0][q_start:q_stop]
         port.device_v[:] = self.start[1][v_start:v_stop]
         port.force_limit[:] = np.inf
-        for effect, array, values in (
-            ()
-            if settings is None
-            else (
-                ("device_limits", port.force_limit, settings.force_limit),
-                ("device_damping", port.device_damping, settings.damping),
-                ("quantisation", port.resolution, settings.position_resolution),
-            )
-        ):
-            if effect in on:
-                array[:] = values
+        if settings is not None:
+            if "device_limits" in on:
+                port.force_limit[:] = settings.force_limit
+            if "device_damping" in on:
+                port.device_damping[:] = settings.damping
+            if "quantisation" in on:
+                port.resolution[:] = settings.position_resolution
         if hand is not None:
             port.device_mass[:] = device.mass_matrix(port.device_q)
             _factored(port.device_mass, port.device_lower)

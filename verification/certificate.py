@@ -9,7 +9,6 @@ other engines are judged in the same way.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -27,6 +26,7 @@ from iapb.numerics.schema import Booleans, Floats, Integers
 from iapb.run import Run, digests
 from iapb.scene.mechanism import mechanism_of, pairs_of, restitutions_of, shapes_of, start_of
 from iapb.scene.reading import scene_from_values
+from reference.exact import relative_energy_gain
 
 Batch = tuple[
     Floats, Floats, Floats, Floats | None
@@ -445,7 +445,7 @@ def _certificate(batches: Iterable[Batch]) -> Certificate:
         judged.append(_judged(masses, before, after))
         for k in np.flatnonzero(judged[-1].gained).tolist():
             one = masses[k % len(masses)], before[k], after[k]
-            largest = max(largest, relative_gain(*one))
+            largest = max(largest, relative_energy_gain(*one))
             first, shown = (first, shown) if first >= 0 else (done + k, _shown(*one))
         if recorded is not None and len(before):
             with np.errstate(over="ignore", invalid="ignore"):  # an overflow fails the certificate
@@ -481,19 +481,6 @@ def _largest_share(error: Floats, size: Floats) -> float:
     with np.errstate(invalid="ignore", divide="ignore"):
         share = np.where(error == 0.0, 0.0, error / size)
     return float(np.where(np.isnan(share), np.inf, share).max(initial=0.0))
-
-
-def relative_gain(mass: ArrayLike, before: ArrayLike, after: ArrayLike) -> float:
-    """Return (KE⁺ − KE⁻)/KE⁻, rounded with its sign kept: never to 0; infinite beyond 1.8e308, and
-    from rest."""
-    gain = exact_gain(mass, before, after)
-    energy = -exact_gain(mass, before, np.zeros_like(before))
-    if not gain or not energy:
-        return np.inf if gain else 0.0
-    try:
-        return float(gain / energy) or math.copysign(5e-324, gain)
-    except OverflowError:
-        return np.inf
 
 
 def _shown(mass: Floats, before: Floats, after: Floats) -> str:

@@ -16,12 +16,11 @@ import numpy as np
 from iapb.contact.kernels.implicit import FADING
 from iapb.contact.solids import Solid, joined
 from iapb.mechanics.energy import FORCES, Steps, energy_ledger, lost_within, moved_straight
-from iapb.mechanics.joints import KINDS
 from iapb.mechanics.rotations import rotation_of
 from iapb.names import in_metres
 from iapb.numerics.schema import Booleans, Floats, Integers
 from iapb.run import UNSOLVED, Run
-from iapb.scene.bodies import WORLD, inertia_matrix
+from iapb.scene.bodies import inertia_matrix
 from iapb.scene.mechanism import limits_of, shape_names
 from iapb.scene.model import scene_kind
 from iapb.system import System
@@ -334,24 +333,18 @@ def _spun(seen: _Seen) -> Iterator[str]:
     force acts on it."""
     run = seen.run
     begin = seen.begin
-    start = 0
-    parents = {body.parent for body in seen.bodies}
     forces = [run.impulse, *(getattr(run, f"{name}_force") for name in FORCES)]
+    trees = seen.mechanism.tree_of_body.tolist()
     for b, body in enumerate(seen.bodies):
-        count = 0 if body.joint_mimic else KINDS[body.joint].nv
-        dofs = slice(start, start := start + count)
+        own = seen.mechanism.tree_dofs[trees[b]]
         free = (
             body.joint in ("planar", "free_flyer")
-            and body.parent == WORLD
+            and trees.count(trees[b]) == 1
             and not any((*body.joint_damping, *body.joint_friction))
         )
-        if (
-            not free
-            or body.name in parents
-            or (dofs.start, dofs.stop) == seen.carried
-            or run.steps <= begin
-        ):
+        if not free or own == seen.carried or run.steps <= begin:
             continue
+        dofs = slice(*own)
         alone = ~np.any([force[begin:, dofs].any(axis=1) for force in forces], axis=0)[
             :, None, None
         ]

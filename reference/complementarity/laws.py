@@ -1,5 +1,12 @@
-"""Impact laws by name: the statement of each, its source, and the hypotheses under which it is
-consistent.
+r"""Impact laws: the statement of each, its source, and the hypotheses under which it is consistent.
+
+| law | source | consistent for |
+|---|---|---|
+| `newton_lcp` | Moreau 1988; Glocker and Pfeiffer 1995 | equal e, or all contacts approach |
+| `poisson` | Glocker and Pfeiffer 1995; Anitescu and Potra 1997 | any E in [0, 1], any gamma_minus |
+| `newton_equality` | Constantinescu, Salcudean and Croft 2005, (15)-(21) | one e for all contacts |
+| `coulomb_ncp` | Moreau 1988; de Saxcé and Feng 1998 | e = 0; with e > 0 it can gain energy |
+| `coulomb_ccp` | Anitescu and Tasora 2010; sliding contacts open at mu \|u_T\| | as `coulomb_ncp` |
 
 All laws act on an ImpactProblem with known mechanics (`ImpactProblem.from_impact`) with E =
 diag(restitution), and return v⁺ and the impulses. The equality laws share no algorithm with the
@@ -7,16 +14,14 @@ engine: they solve A x = target by singular values (lstsq), while the engine ort
 
 With redundant contacts, many p give the same generalized impulse Jᵀp. A negative entry of the
 minimum-norm p alone does not mean adhesion: the contacts pull only if *no* p >= 0 gives the same
-Jᵀp.
+Jᵀp (`unpushed_share`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from iapb.errors import ArgumentError, SolverError
 from reference import Floats
@@ -30,13 +35,6 @@ LAW_TOLERANCE = 1e-9
 # and Lemke ends on a ray; projections (Gauss-Seidel) do not, but may be slow. Each solution's
 # residual is recomputed.
 LADDER = ("daqp", "quadprog", "lemke", "gauss_seidel")
-# Residual, as a share of |L⁻¹ Jᵀp|, below which a non-negative impulse exists: the active-set least
-# squares ends near 1e-13 for a consistent problem and far above for an inconsistent one.
-EXPLAINED = 1e-9
-ROUNDING = 1e-12  # share of the largest impulse below which a negative one counts as rounding error
-NONE = "none"
-ARTEFACT = "artefact of the minimum norm"
-ADHESIVE = "adhesive"
 
 
 @dataclass(frozen=True)
@@ -46,19 +44,6 @@ class Outcome:
     velocity: Floats  #: (d,) v⁺
     impulse: Floats  #: (n,) p [N s]
     residual: float = 0.0  #: largest recomputed residual of the problems solved
-
-
-@dataclass(frozen=True)
-class Law:
-    """An impact law: statement, source, hypotheses, and whether it never gains energy under
-    them."""
-
-    name: str
-    statement: str
-    source: str
-    hypotheses: str
-    never_gains_energy: bool
-    apply: Callable[..., Outcome]
 
 
 def newton_lcp(problem: ImpactProblem, solver: str | None = None) -> Outcome:
@@ -124,30 +109,6 @@ def coulomb_ccp(problem: ImpactProblem, solver: str = "nsgs") -> Outcome:
     return newton_lcp(replace(problem, relaxed=True), solver)
 
 
-def pulling_share(
-    contact_jacobian: ArrayLike, generalized_impulse: ArrayLike, mass_matrix: ArrayLike
-) -> float:
-    """Return the least |L⁻¹(Jᵀp − given)| / |L⁻¹ given| over all p >= 0, for J (c, d), given (d,)
-    and M = L Lᵀ (d, d).
-
-    If it is at most EXPLAINED, some p gives the same motion without pulling.
-    Source: Lawson and Hanson, Solving Least Squares Problems (1974), by `scipy.optimize.nnls`.
-
-    Raises
-    ------
-    SolverError
-        The least-squares iteration does not converge.
-    """
-    rows = np.asarray(contact_jacobian, np.float64)
-    given = np.asarray(generalized_impulse, np.float64)
-    if rows.ndim != 2 or rows.shape[1:] != given.shape:
-        raise ArgumentError(
-            "contact_jacobian", rows.shape, f"{len(given)} columns, as generalized_impulse"
-        )
-    cholesky = np.linalg.cholesky(np.asarray(mass_matrix, np.float64))
-    return unpushed_share(np.linalg.solve(cholesky, rows.T), np.linalg.solve(cholesky, given))
-
-
 def unpushed_share(columns: np.ndarray, goal: np.ndarray) -> float:
     """Return the least |columns @ p − goal| / |goal| over all p >= 0; 0 if the goal is 0."""
     from scipy.optimize import nnls
@@ -161,17 +122,6 @@ def unpushed_share(columns: np.ndarray, goal: np.ndarray) -> float:
         return float(nnls(columns / unit, goal / size)[1])
     except RuntimeError as error:
         raise SolverError(f"non-negative least squares: {error}") from error
-
-
-def adhesion(contact_jacobian: ArrayLike, impulses: ArrayLike, mass_matrix: ArrayLike) -> str:
-    """Return NONE, ARTEFACT or ADHESIVE for impulses (c,) of any law."""
-    p = np.asarray(impulses, np.float64)
-    if p.min(initial=0.0) >= -ROUNDING * np.abs(p).max(initial=0.0):
-        return NONE
-    given = np.asarray(contact_jacobian, np.float64).T @ p
-    return (
-        ARTEFACT if pulling_share(contact_jacobian, given, mass_matrix) <= EXPLAINED else ADHESIVE
-    )
 
 
 def _solved(problem: ImpactProblem, solver: str | None, speed: float = 0.0) -> tuple[Floats, float]:
@@ -196,58 +146,3 @@ def _known(mechanics: Floats | None) -> Floats:
             "problem", "without mechanics", "a problem made by ImpactProblem.from_impact"
         )
     return mechanics
-
-
-LAWS: dict[str, Law] = {
-    law.name: law
-    for law in (
-        Law(
-            "newton_lcp",
-            "0 <= p ⟂ gamma_plus + E gamma_minus >= 0",
-            "Moreau 1988; Glocker and Pfeiffer 1995",
-            "equal e, or all given contacts approach (gamma_minus <= 0)",
-            True,
-            newton_lcp,
-        ),
-        Law(
-            "poisson",
-            "0 <= p_c ⟂ gamma_c >= 0, then 0 <= p_e - E p_c ⟂ gamma_plus >= 0",
-            "Glocker and Pfeiffer 1995; Anitescu and Potra 1997",
-            "any E in [0, 1], any gamma_minus",
-            True,
-            poisson,
-        ),
-        Law(
-            "newton_equality",
-            "gamma_plus = -E gamma_minus, p of either sign",
-            "Constantinescu, Salcudean, Croft 2005, (15)-(21)",
-            "one e for all contacts",
-            True,
-            newton_equality,
-        ),
-        Law(
-            "per_body_equality",
-            "newton_equality with separate rows for each body",
-            "Constantinescu, Salcudean, Croft 2005, (13)-(14)",
-            "one e for all contacts; momentum is not conserved at self-collisions",
-            True,
-            newton_equality,
-        ),
-        Law(
-            "coulomb_ncp",
-            "K ∋ p ⟂ u + mu |u_T| n ∈ K*, u = gamma_plus + E gamma_minus on the normals",
-            "Moreau 1988; de Saxcé and Feng 1998",
-            "e = 0; with e > 0 it can gain energy (Kane and Levinson 1985)",
-            True,
-            coulomb_ncp,
-        ),
-        Law(
-            "coulomb_ccp",
-            "K ∋ p ⟂ u ∈ K*, u as in coulomb_ncp; sliding contacts open at mu |u_T|",
-            "Anitescu and Tasora 2010",
-            "e = 0; with e > 0 it can gain energy",
-            True,
-            coulomb_ccp,
-        ),
-    )
-}

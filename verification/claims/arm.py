@@ -20,7 +20,6 @@ ALL = "all"
 SOME = "part"
 RODS = "uniform rods"
 POINTS = "point masses at the ends of the links"
-PLACE_A = 0.7
 PLACE_B = 0.5
 ANGLES = (0.0, 0.5, 1.0, 2.0)
 PLACES = (0.1, 0.3, 0.5, 0.6, 0.7, 0.9, 1.0)

@@ -152,7 +152,6 @@ def compare_cases(
 
 
 PILES = "piles of spheres"
-NEIGHBOUR = "with a neighbour"
 COUNTS = {"quick": 25, "full": 250}  # impacts of each family, restitution and redundancy
 # e of the scene (None), and e = 0.5, which gives more impacts, some of which differ
 SCENE_RESTITUTIONS = (None, 0.5)

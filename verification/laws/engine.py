@@ -17,8 +17,9 @@ from iapb import resolve_impact
 from iapb.contact.kernels.collide import largest_share
 from iapb.errors import IapbError
 from iapb.run import Run
+from reference.exact import relative_energy_gain
 from verification.impacts import EPS, Floats, ImpactCase, draw_case, draw_extreme_case
-from verification.laws.bounds import FACTORED, KIT, Found, Law, LawCount, law, relative_gain
+from verification.laws.bounds import FACTORED, KIT, Found, Law, LawCount, law
 from verification.laws.resolver import Resolver, outcome
 from verification.laws.scenes import ROOM, SceneCase, Values, draw_scene
 
@@ -41,7 +42,7 @@ def every_budget_is_passive(case: ImpactCase, subject: Callable[..., Any]) -> Fo
         outcome(partial(subject, budget=budget), case)
         for budget in range(min(case.contacts, case.coordinates) + 1)
     ]
-    worst = max(relative_gain(case.mass_matrix, case.velocity, v_plus) for v_plus in answers)
+    worst = max(relative_energy_gain(case.mass_matrix, case.velocity, v_plus) for v_plus in answers)
     idle = np.array_equal(answers[0], case.velocity)
     return worst if idle else np.inf, FACTORED.energy_gain(case)
 
@@ -116,7 +117,7 @@ def limited_impulses_are_passive(case: LimitedImpact, subject: Renderer) -> Foun
     mass = case.impact.mass_matrix
     v = case.impact.velocity
     gains = [
-        relative_gain(mass, v, v + np.linalg.solve(mass, p))
+        relative_energy_gain(mass, v, v + np.linalg.solve(mass, p))
         for p in (tool_impulse, case.dt * device_force)
     ]
     value = np.inf if np.any(np.abs(device_force) > case.force_limit) else max(gains)

@@ -19,7 +19,6 @@ from verification.impacts import (
     LARGE_CONTACTS,
     LARGE_COORDINATES,
     LARGE_EVERY,
-    Floats,
     ImpactCase,
     with_unequal_restitution,
 )
@@ -226,13 +225,6 @@ class PassivityReport(Report):
     def counterexample_law(self) -> str:
         """Name of the law that the first counterexample breaks; "" if there is none."""
         return self.found[0].law if self.found else ""
-
-    @property
-    def returned(self) -> Floats | str:
-        """v⁺ (d,) of the law's first call for the counterexample, or why it is unusable."""
-        if not self.found:
-            return ""
-        return self.found[0].calls[0][1] if self.found[0].calls else self.found[0].fault
 
     @property
     def counterexample_test(self) -> str:

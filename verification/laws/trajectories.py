@@ -20,8 +20,9 @@ from iapb.run import Run
 from iapb.scene import scene_from_text
 from iapb.system import System
 from reference import Floats
+from reference.exact import relative_energy_gain
 from verification.impacts import EPS, over
-from verification.laws.bounds import FACTORED, Found, Law, LawResidual, law, relative_gain
+from verification.laws.bounds import FACTORED, Found, Law, LawResidual, law
 
 TRAJECTORY_LAWS: dict[str, Law] = {}
 BY_THE_ENGINE = ("impulse-augmented penalty", "penalty")
@@ -175,7 +176,7 @@ def impacts_take_energy(trajectory: Trajectory) -> Found:
         ]
         of = np.concatenate(trees) if trees else np.arange(impacts.impulse.shape[1])
         mass = whole[np.ix_(of, of)]
-        gain = relative_gain(mass, impacts.v_minus[k][of], impacts.v_plus[k][of])
+        gain = relative_energy_gain(mass, impacts.v_minus[k][of], impacts.v_plus[k][of])
         values = np.linalg.eigvalsh(mass)
         ratios.append(
             gain / (FACTORED.factor * len(of) * EPS * float(np.sqrt(values[-1] / values[0])))
