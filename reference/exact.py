@@ -1,16 +1,10 @@
-"""Exact results for hard impacts in rational numbers (python-flint), and energy gains in
-double-double arithmetic.
+"""Exact results for hard impacts in rational numbers (python-flint), and exact energy gains.
 
 Every finite double is a rational number, so an impact given in doubles has an exact outcome of
 (21), v⁺ = v − (1+e) M⁻¹Jᵀ(J M⁻¹Jᵀ)†J v = v − (1+e) M⁻¹Jₙᵀ(Jₙ M⁻¹Jₙᵀ)⁻¹Jₙ v, with Jₙ a maximal
 independent subset of the rows (33). The subset is found without rounding, so redundancy is decided
 exactly. Rows that are redundant only up to rounding are independent here; give fractions for exact
 redundancy.
-
-For many impacts `bulk_energy_gain` judges energy in double-double arithmetic with a running error
-bound: 2 (KE⁺ − KE⁻) = ΔᵀMs with Δ = v⁺ − v⁻ and s = v⁺ + v⁻, which are exact double-doubles, so the
-energies do not cancel. If M is not symmetric to the last bit, the formula is ½(ΔᵀMs + sᵀMΔ).
-Source: Dekker, Numerische Mathematik 18 (1971); Ogita, Rump, Oishi, SIAM J. Sci. Comput. 26 (2005).
 """
 
 from __future__ import annotations
@@ -29,13 +23,6 @@ from reference import Floats
 
 Rational = Any  # flint.fmpq_mat; named here because flint is imported only when used
 _flint = cache(partial(needed, "flint", "Exact arithmetic"))
-
-_SPLITTER = 134217729.0  # 2^27 + 1: splits a double into two halves whose products are exact
-_ROUNDING = 2.0**-100  # bound of the error of one double-double operation, which is below 2^-102
-# Beyond these magnitudes the halves or the error terms leave the range of doubles; use exact
-# arithmetic then.
-_SMALLEST = 1e-60
-_LARGEST = 1e60
 
 
 @dataclass(frozen=True)
@@ -127,8 +114,7 @@ def relative_energy_gain(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: Arr
     """Return (KE⁺ − KE⁻)/KE⁻ computed exactly from the given numbers and rounded, but no gain to 0;
     > 0 is a gain.
 
-    If KE⁻ = 0, the result is 0 for KE⁺ = 0 and infinity otherwise. For many impacts see
-    `bulk_energy_gain`.
+    If KE⁻ = 0, the result is 0 for KE⁺ = 0 and infinity otherwise.
     """
     mass = _whole_numbers("mass_matrix", mass_matrix)
     v, v_after = _whole_numbers("velocities", [v_minus, v_plus])
@@ -201,96 +187,3 @@ def _nonzero_eigenvalues(matrix: Rational) -> list[float]:
     0."""
     roots = matrix.charpoly().complex_roots()
     return sorted(float(root.real.mid()) for root, _ in roots if not root.contains(0))
-
-
-def bulk_energy_gain(
-    mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike
-) -> tuple[Floats, Floats]:
-    """Return (gain, bound), each (n,): (KE⁺ − KE⁻)/KE⁻ per impact and a bound of its error.
-
-    Shapes: M (n, d, d) or (d, d), v⁻ and v⁺ (n, d). If KE⁻ is not positive, gain is NaN and bound
-    infinity.
-    """
-    before, after = (np.atleast_2d(np.asarray(v, np.float64)) for v in (v_minus, v_plus))
-    masses = np.asarray(mass_matrix, np.float64)
-    n, d = before.shape
-    if after.shape != before.shape:
-        raise ArgumentError("v_plus", after.shape, f"shape {before.shape}, as v_minus")
-    if masses.shape not in ((d, d), (n, d, d)):
-        raise ArgumentError("mass_matrix", masses.shape, f"shape ({d}, {d}) or ({n}, {d}, {d})")
-    for argument, array in (("mass_matrix", masses), ("v_minus", before), ("v_plus", after)):
-        size = np.abs(array)
-        if not size.max(initial=0.0) <= _LARGEST or array[size < _SMALLEST].any():
-            expected = (
-                f"magnitudes in [{_SMALLEST:g}, {_LARGEST:g}] or 0; use relative_energy_gain beyond"
-            )
-            raise ArgumentError(argument, array, expected)
-    masses = np.broadcast_to(masses, (n, d, d))
-    difference = _two_sum(after, -before)
-    total = _two_sum(after, before)
-    change, change_low, size = _bilinear(masses, difference, total)
-    if (masses != np.swapaxes(masses, 1, 2)).any():
-        turned, turned_low, turned_size = _bilinear(masses, total, difference)
-        change = 0.5 * _add(change, change_low, turned, turned_low)[0]
-        size = 0.5 * (size + turned_size)
-    at_rest = np.zeros_like(before)
-    energy, _, energy_size = _bilinear(masses, (before, at_rest), (before, at_rest))
-    known = energy > d * d * _ROUNDING * energy_size
-    energy = np.where(known, energy, 1.0)
-    gain = change / energy
-    rounding = 4.0 * abs(gain) * 2.0**-53  # the final division and the dropped low parts
-    bound = 2.0 * d * _ROUNDING * (size + abs(gain) * energy_size) / energy + rounding
-    return np.where(known, gain, np.nan), np.where(known, bound, np.inf)
-
-
-def _two_sum(a: Any, b: Any) -> tuple[Any, Any]:
-    """Return a + b as an exact pair (sum, error)."""
-    s = a + b
-    t = s - a
-    return s, (a - (s - t)) + (b - t)
-
-
-def _two_product(a: Any, b: Any) -> tuple[Any, Any]:
-    """Return a b as an exact pair (product, error)."""
-    p = a * b
-    c = _SPLITTER * a
-    a1 = c - (c - a)
-    a2 = a - a1
-    c = _SPLITTER * b
-    b1 = c - (c - b)
-    b2 = b - b1
-    return p, a2 * b2 - (((p - a1 * b1) - a2 * b1) - a1 * b2)
-
-
-def _add(ah: Any, al: Any, bh: Any, bl: Any) -> tuple[Any, Any]:
-    """Return the double-double sum, in the accurate variant that keeps both low parts."""
-    sh, sl = _two_sum(ah, bh)
-    th, tl = _two_sum(al, bl)
-    sh, sl = _two_sum(sh, sl + th)
-    return _two_sum(sh, sl + tl)
-
-
-def _multiply(ah: Any, al: Any, bh: Any, bl: Any) -> tuple[Any, Any]:
-    """Return the double-double product."""
-    ph, pl = _two_product(ah, bh)
-    return _two_sum(ph, pl + (ah * bl + al * bh))
-
-
-def _bilinear(
-    masses: Floats, a: tuple[Floats, Floats], b: tuple[Floats, Floats]
-) -> tuple[Floats, Floats, Floats]:
-    """Return aᵀ M b (n,) as a double-double, and the sum of |a_i M_ij b_j|, for double-double
-    vectors a and b (n, d)."""
-    n, d, _ = masses.shape
-    a_high, a_low = a
-    b_high, b_low = b
-    felt = _multiply(b_high[:, None, :], b_low[:, None, :], masses, 0.0)
-    terms = _multiply(a_high[:, :, None], a_low[:, :, None], *felt)
-    size = np.abs(terms[0]).sum(axis=(1, 2))
-    left = 1 << (d * d - 1).bit_length()
-    high, low = np.zeros((2, n, left))
-    high[:, : d * d], low[:, : d * d] = (part.reshape(n, d * d) for part in terms)
-    while left > 1:  # add halves: fewer roundings than one after another
-        left //= 2
-        high, low = _add(high[:, :left], low[:, :left], high[:, left:], low[:, left:])
-    return high[:, 0], low[:, 0], size

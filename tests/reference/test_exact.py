@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from iapb.errors import ArgumentError
 from reference import exact
 from reference.exact import (
-    bulk_energy_gain,
     exact_impact,
     exact_rank,
     independent_rows,
@@ -67,26 +66,6 @@ def test_condition_numbers() -> None:
     assert exact.row_condition_number(np.eye(2), np.zeros((0, 2))) == 1.0
 
 
-@pytest.mark.parametrize("symmetric", [True, False])
-@pytest.mark.parametrize("kappa", [1.0, 1e6, 1e12])
-def test_double_double_gain_is_within_its_bound_of_the_rational_one(
-    kappa: float, symmetric: bool
-) -> None:
-    """Also where M is asymmetric in the last bits, as Q D Qᵀ is; mostly along the light direction,
-    which cancels."""
-    rng = np.random.default_rng(int(np.log10(kappa)))
-    for _ in range(10):
-        d = int(rng.integers(1, 9))
-        q, _ = np.linalg.qr(rng.normal(size=(d, d)))
-        mass = (q * np.geomspace(1.0, kappa, d)) @ q.T
-        mass = 0.5 * (mass + mass.T) if symmetric else mass
-        before = q[:, 0] + 1e-9 * rng.normal(size=d)
-        after = before * (1.0 + 1e-15 * rng.normal(size=d))
-        (gain,), (bound,) = bulk_energy_gain(mass, before, after)
-        truth = relative_energy_gain(mass, before, after)
-        assert abs(gain - truth) <= bound <= 1e-15 * abs(truth) + 1e-14 * kappa * 1e-12
-
-
 @pytest.mark.parametrize(
     ("arguments", "gain"),
     [
@@ -106,9 +85,7 @@ def test_a_gain_beyond_the_range_of_doubles_is_a_gain(arguments: Any, gain: floa
     [
         (exact_impact, ([[1.0]], [[np.nan]], [1.0], 1.0), "finite"),
         (exact_impact, ([[1.0]], [[1.0, 2.0]], [1.0], 1.0), "columns"),
-        (bulk_energy_gain, ([[1.0]], [1e200], [1.0]), "magnitudes"),
-        (bulk_energy_gain, ([[1.0]], [1.0], [[1.0], [1.0]]), "as v_minus"),
-        (bulk_energy_gain, (np.eye(2), [1.0], [1.0]), "mass_matrix"),
+        (relative_energy_gain, ([[1.0]], [1.0], [np.nan]), "finite"),
     ],
 )
 def test_refusals(call: Any, arguments: Any, says: str) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 from iapb import resolve_impact
 from reference.complementarity.laws import newton_lcp
 from reference.complementarity.problem import ImpactProblem
-from reference.exact import bulk_energy_gain, exact_impact, fractions_of, rational_matrix
+from reference.exact import exact_impact, fractions_of, rational_matrix, relative_energy_gain
 from reference.worlds import run_world
 from verification.check import Check, Study
 from verification.claims.conditions import START, Condition, start_conditions
@@ -145,16 +145,17 @@ def kinetic_energy(mass_matrix: Floats, velocity: Floats) -> float:
 
 
 def energy_gains(batch: Batch) -> Floats:
-    """Relative energy gain of each impact in double-double arithmetic, plus the error bound of that
-    arithmetic."""
-    after = np.stack(
-        [resolve_impact(*case.arrays, batch.restitution).velocity for case in batch.impacts]
+    """Relative energy gain of each impact, in whole numbers."""
+    return np.array(
+        [
+            relative_energy_gain(
+                case.mass_matrix,
+                case.velocity,
+                resolve_impact(*case.arrays, batch.restitution).velocity,
+            )
+            for case in batch.impacts
+        ]
     )
-    masses = np.stack([case.mass_matrix for case in batch.impacts])
-    gain, uncertainty = bulk_energy_gain(
-        masses, np.stack([case.velocity for case in batch.impacts]), after
-    )
-    return gain + uncertainty
 
 
 def _exact_changes(batch: Batch) -> list[float]:

@@ -14,7 +14,7 @@ from iapb import resolve_impacts
 from iapb.contact.kernels.impact import ImpactWork, factored_impacts
 from iapb.numerics.compiled import block
 from iapb.numerics.schema import zeros_of
-from reference.exact import bulk_energy_gain
+from reference.exact import relative_energy_gain
 from reference.one_thread import one_thread
 from verification.certificate import judge_gains
 from verification.check import SEED, Check, Study
@@ -103,7 +103,8 @@ def judged_impacts(family: str, impacts: int, method: str = OURS, seed: int = SE
         moved += int((v_plus != given.v).any(axis=1).sum())
         cancelled += int((clamps <= 0.0).sum())
         if gained.any():
-            relative = bulk_energy_gain(given.mass, given.v, v_plus)[0][gained]
+            each = zip(given.mass[gained], given.v[gained], v_plus[gained], strict=True)
+            relative = np.array([relative_energy_gain(*impact) for impact in each])
             bound = 10.0 * d * EPS * np.sqrt(given.condition[gained])
             found += relative.tolist()
             share = max(share, float((relative / bound).max()))
