@@ -8,7 +8,8 @@ distribution, so Figure 3 has two.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -22,8 +23,6 @@ from reports.figures.plot import Canvas, Plot, arrow, note
 from reports.figures.style import (
     BLUE,
     BOUND,
-    FORCE,
-    GREEN,
     INK,
     LINK,
     MUTED,
@@ -40,67 +39,25 @@ _LONGEST = 0.22  # arrow length of Figure 1, as a share of the picture
 _ARROW = 0.02
 _AXIS = 0.006
 _WALL = 0.008
-_BOARD = (
-    np.zeros(2),
-    np.array([8.2, 5.2]),
-)  # corners of the diagrams of Figure 5, in arbitrary units
 
 
-_RESTITUTION = 0.5  # of the picture of one impact
-_VELOCITY = np.array([-1.5, 1.1])  # in the kinetic metric; the contact is the vertical line
+def _drawing(name: str) -> str:
+    """Return a diagram that no number changes, drawn once."""
+    return files(__package__).joinpath("drawings", f"{name}.svg").read_text("utf-8")
 
 
 @recipe("impact-and-step")
 def impact_and_step() -> Drawn:
-    """Draw the velocity before and after one impact, and the loop of a step."""
-    along = np.array([_VELOCITY[0], 0.0])
-    after = _VELOCITY - (1.0 + _RESTITUTION) * along
-    size = (4.3, 3.3)
-    with Canvas("idea-impact", np.array([-2.0, -0.5]), np.array([1.9, 2.5]), size) as impact:
-        axes = impact.axes
-        turn = np.linspace(0.0, np.pi, 90)
-        axes.plot(
-            *np.hypot(*_VELOCITY) * np.array([np.cos(turn), np.sin(turn)]),
-            color=MUTED,
-            dashes=(3, 3),
-        )
-        axes.plot([0.0, 0.0], [-0.35, 2.3], color=MUTED, linewidth=0.8)
-        note(axes, (0.0, 2.3), "velocities that keep the contact", (0, 7), color=MUTED, fontsize=8)
-        note(axes, (1.05, 1.54), "equal energy", (22, 8), color=MUTED, fontsize=8)
-        for vector, name, color, offset in (
-            (_VELOCITY, "v⁻", INK, (-2, 10)),
-            (along, "P v⁻", VERMILION, (0, -9)),
-            (after, "v⁻ − (1 + e) P v⁻", BLUE, (-10, 11)),
-        ):
-            arrow(axes, (0.0, 0.0), vector, color=color)
-            note(axes, vector, name, offset, color=color)
-        axes.plot(*np.array([_VELOCITY, after]).T, color=BLUE, linewidth=1.0, linestyle=(0, (2, 2)))
-    with Canvas("idea-step", np.zeros(2), np.array([8.6, 6.6]), size) as step:
-        axes = step.axes
-        wide = (4.4, 1.0)
-        _block(axes, (4.3, 5.9), "find contacts", wide, facecolor="none")
-        _block(axes, (2.05, 3.9), "new and approaching:\none impulse, v⁻ to v⁺", (3.9, 1.3))
-        _block(axes, (6.55, 3.9), "lasting:\nspring and damper", (3.5, 1.3), facecolor="none")
-        _block(axes, (4.3, 1.9), "add the hand's force", wide, facecolor="none")
-        _block(axes, (4.3, 0.6), "move by one step, 1/512 s", wide, facecolor="none")
-        for corners in (
-            [(3.2, 5.4), (2.05, 4.55)],
-            [(5.4, 5.4), (6.55, 4.55)],
-            [(2.05, 3.25), (3.2, 2.4)],
-            [(6.55, 3.25), (5.4, 2.4)],
-            [(4.3, 1.4), (4.3, 1.1)],
-            [(6.5, 0.6), (8.5, 0.6), (8.5, 5.9), (6.5, 5.9)],
-        ):
-            _wire(axes, corners)
+    """Show the velocity before and after one impact, and the loop of a step."""
     panels = (
         Panel(
-            impact.svg,
+            _drawing("impact"),
             "An arrow v⁻, its part P v⁻ along the contact, and the velocity after the impact, which "
             "is no longer than v⁻.",
-            f"one impact, e = {_RESTITUTION:g}",
+            "one impact, e = 0.5",
         ),
         Panel(
-            step.svg,
+            _drawing("step"),
             "Find contacts; new ones get an impulse, lasting ones a spring; add the hand's force; "
             "move; again.",
             "one step",
@@ -377,101 +334,18 @@ def peg_corner(scene: Mapping[str, Any]) -> Drawn:
 
 @recipe("fig05", "scene/peg_corner")
 def couplings(scene: Mapping[str, Any]) -> Drawn:
-    """Draw both diagrams; the table repeats the scene's gains."""
-    size = (5.0, 5.0 * _BOARD[1][1] / _BOARD[1][0])
-    with (
-        Canvas("fig05-unilateral", *_BOARD, size) as one,
-        Canvas("fig05-four", *_BOARD, size) as four,
-    ):
-        tools = (
-            (one.axes, "virtual tool,\nrigid contacts", GREEN),
-            (four.axes, "virtual tool", BLUE),
-        )
-        for axes, tool, color in tools:
-            _block(axes, (2.05, 2.6), "device", (1.6, 1.3))
-            _block(axes, (7.0, 2.6), tool, (1.7, 1.3))
-            for left, right in (
-                (2.85, 3.75),
-                (5.25, 6.15),
-            ):  # the two directions of the spring and damper
-                for end in (left, right):
-                    _wire(axes, [((left + right) / 2, 2.6), (end, 2.6)], color=color)
-        _block(
-            one.axes,
-            (4.5, 2.6),
-            "K cpl\nB cpl",
-            (1.5, 1.1),
-            facecolor="none",
-            edgecolor=MUTED,
-            linestyle=(0, (4, 2)),
-        )
-        one.axes.text(
-            4.5, 1.78, "only in contact", ha="center", va="center", fontsize=8.5, color=GREEN
-        )
-        _wire(
-            one.axes,
-            [(0.6, 4.35), (0.6, 2.6), (1.25, 2.6)],
-            "hand force",
-            (0.75, 4.3),
-            color=FORCE,
-            align="left",
-        )
-        _wire(
-            one.axes,
-            [(2.05, 1.95), (2.05, 0.85), (7.0, 0.85), (7.0, 1.95)],
-            "free motion: the tool follows",
-            (4.5, 0.62),
-            linestyle=(0, (4, 2)),
-        )
-        _block(four.axes, (4.5, 2.6), "K coord\nB coord", (1.5, 1.1), facecolor="none")
-        four.axes.plot(
-            0.6,
-            2.6,
-            "o",
-            markersize=17.6,
-            markerfacecolor="none",
-            markeredgecolor=INK,
-            markeredgewidth=1.1,
-        )
-        four.axes.text(
-            0.6, 2.6, "+", ha="center", va="center", fontsize=9, zorder=4
-        )  # forces are added
-        _wire(
-            four.axes,
-            [(0.6, 4.9), (0.6, 2.8)],
-            "hand force",
-            (0.75, 4.85),
-            color=FORCE,
-            align="left",
-        )
-        _wire(
-            four.axes,
-            [(0.6, 4.35), (7.0, 4.35), (7.0, 3.25)],
-            "hand force channel",
-            (4.1, 4.55),
-            color=FORCE,
-        )
-        _wire(four.axes, [(0.8, 2.6), (1.25, 2.6)])
-        _wire(
-            four.axes,
-            [(7.0, 1.95), (7.0, 0.85), (0.6, 0.85), (0.6, 2.4)],
-            "environment force channel",
-            (4.1, 0.62),
-            color=FORCE,
-        )
+    """Show both diagrams; the table repeats the scene's gains."""
     panels = (
         Panel(
-            one.svg,
+            _drawing("unilateral"),
             "The hand pushes the device only; a spring and damper joins device and tool while the "
-            "tool is "
-            "in contact.",
+            "tool is in contact.",
             "(a) unilateral coupler: CBuc",
         ),
         Panel(
-            four.svg,
+            _drawing("four_channel"),
             "The hand pushes device and tool alike; the environment force of the tool goes to the "
-            "device; "
-            "a spring and damper joins device and tool.",
+            "device; a spring and damper joins device and tool.",
             "(b) four channels: ideal, IAPB, PB",
         ),
     )
@@ -487,60 +361,3 @@ def couplings(scene: Mapping[str, Any]) -> Drawn:
         )
     )
     return Drawn(panels, titled(("Table I", "x", "y", "θ", "unit"), rows))
-
-
-def _block(
-    axes: Any, center: tuple[float, float], text: str, size: tuple[float, float], **how: Any
-) -> None:
-    """Draw a box with text in it."""
-    from matplotlib.patches import FancyBboxPatch
-
-    x = center[0] - size[0] / 2
-    y = center[1] - size[1] / 2
-    axes.add_patch(
-        FancyBboxPatch(
-            (x, y),
-            *size,
-            boxstyle="round,pad=0,rounding_size=0.12",
-            linewidth=1.1,
-            zorder=3,
-            **{"facecolor": PEG, "edgecolor": INK, **how},
-        )
-    )
-    axes.text(*center, text, ha="center", va="center", fontsize=9, zorder=4, linespacing=1.35)
-
-
-def _wire(
-    axes: Any,
-    corners: Sequence[tuple[float, float]],
-    text: str = "",
-    at: tuple[float, float] = (0, 0),
-    *,
-    color: str = INK,
-    align: str = "center",
-    **how: Any,
-) -> None:
-    """Draw a signal along `corners` with an arrow head at its end, and its name at `at`."""
-    axes.plot(
-        *zip(*corners, strict=True),
-        color=color,
-        linewidth=1.2,
-        solid_capstyle="butt",
-        zorder=2,
-        **how,
-    )
-    axes.annotate(
-        "",
-        xy=corners[-1],
-        xytext=corners[-2],
-        zorder=2,
-        arrowprops={
-            "arrowstyle": "-|>",
-            "color": color,
-            "linewidth": 0,
-            "mutation_scale": 10,
-            "shrinkA": 0,
-            "shrinkB": 0,
-        },
-    )
-    axes.text(*at, text, ha=align, va="center", fontsize=8.5, color=color, zorder=4)
