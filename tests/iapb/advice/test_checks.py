@@ -266,14 +266,3 @@ walls:
     ):  # the last two: a body that has turned before
         assert not check_scene(scene(box(position=[0, 1, angle])))
     assert [one.kind for one in check_scene(scene(box(position=[0, 1, 90])))] == ["degrees"]
-    solid = box(joint="free_flyer", inertia=[0.1, 0.1, 0.1, 0, 0, 0], rpy=[0, 90, 0], position=[])
-    spatial = {
-        "name": "made",
-        "dimensions": 3,
-        "rate": 1000,
-        "duration": 0.1,
-        "bodies": [solid | {"shapes": [{"kind": "box", "size": [0.1, 0.1, 0.1]}]}],
-    }
-    assert {one.where for one in check_scene(SpatialScene.model_validate(spatial))} == {
-        "bodies.box_0.rpy[1]"
-    }

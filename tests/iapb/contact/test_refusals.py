@@ -76,17 +76,12 @@ REFUSED: list[tuple[str, str, Any, str]] = [
         ("one", "restitution", value, place)
         for value, place in (
             (1.0000001, ""),
-            (-1.0000001, ""),
             (NAN, ""),
             ("0.5", ""),
-            (None, ""),
             ([0.5], ""),
-            ([[0.5, 0.5]], ""),
             (10**400, ""),
             ([0.5, -0.1], "[1]"),
-            ([1.1, 0.5], "[0]"),
             ([0.5, NAN], "[1]"),
-            ([-2.0, -2.0], "[0]"),
             (np.ma.masked_array([0.5, 0.5], [True, False]), ""),
         )
     ),
@@ -95,8 +90,8 @@ REFUSED: list[tuple[str, str, Any, str]] = [
         for border in ("one", "many")
         for name, values in (
             ("clamp", ("no", 0)),
-            ("budget", (-1, 1.5, True)),
-            ("rank_tolerance", (0.0, 1.0, 2.0, NAN, "tight", [1e-8])),
+            ("budget", (-1, 1.5)),
+            ("rank_tolerance", (0.0, 1.0, NAN, "tight")),
         )
         for value in values
     ),
@@ -105,15 +100,11 @@ REFUSED: list[tuple[str, str, Any, str]] = [
         ("many", name, value, place)
         for name, value, place in (
             ("mass_matrices", np.eye(2), ""),
-            ("mass_matrices", np.ones((2, 2, 2)), ""),
             ("mass_matrices", [np.eye(2), np.eye(2), [[1.0, 0.0], [0.0, NAN]]], "[2, 1, 1]"),
             ("mass_matrices", [np.eye(2), np.ones((2, 2)), np.eye(2)], "[1]"),
             ("contact_jacobians", np.ones((3, 1, 3)), ""),
-            ("contact_jacobians", np.full((3, 1, 2), INF), "[0, 0, 0]"),
-            ("velocities", "fast", ""),
             ("velocities", [[0.0, 0.0], [0.0, NAN], [0.0, 0.0]], "[1, 1]"),
             ("restitution", [0.5, 1.5, 0.5], "[1]"),
-            ("restitution", NAN, ""),
             ("restitution", [0.5, 0.5], ""),
         )
     ),
@@ -121,15 +112,12 @@ REFUSED: list[tuple[str, str, Any, str]] = [
         ("friction", name, value, "")
         for name, value in (
             ("tangents", [[1.0, 0.0, 0.0]]),
-            ("tangents", [[1.0, 0.0]]),
             ("tangents", [[NAN, 0.0], [0.0, 1.0]]),
             ("tangents", np.ones((2, 3, 2))),
             ("friction", -0.1),
             ("friction", [0.1] * 3),
-            ("friction", INF),
             ("restitution", -0.5),
             ("restitution", [0.1]),
-            ("restitution", 1.5),
         )
     ),
 ]

@@ -57,19 +57,6 @@ def test_what_depends_on_earlier_calls_is_printed_with_them(make: Callable[[], A
         assert residual is not None and residual.passed
 
 
-@pytest.mark.parametrize(
-    ("law", "contract"), [("elastic", "equality"), ("separating", "unilateral")]
-)
-def test_the_calls_shown_are_those_that_the_law_makes(law: str, contract: str) -> None:
-    """`elastic` calls with e = 1, `separating` with the normals turned."""
-    report = check_passivity(
-        lambda M, J, v, e: -0.5 * v, contract=contract, laws=[law], impacts=20, search=0
-    )
-    given, answer = report.found[0].calls[-1]
-    assert np.array_equal(answer, -0.5 * given[2])
-    assert given[3] == 1.0 if law == "elastic" else np.all(given[1] @ given[2] >= 0.0)
-
-
 @pytest.mark.thorough
 @pytest.mark.parametrize(
     ("fault", "words"),
