@@ -11,6 +11,7 @@ import pytest
 
 from iapb.contact import finding
 from iapb.contact.finding import ContactFinder
+from iapb.contact.geometry import BOX, Shape, candidate_pairs, make_shapes
 from iapb.scene import Scene
 from iapb.simulation import simulate
 from iapb.system import System
@@ -128,6 +129,32 @@ def test_contacts_of_a_crowd_are_those_of_support_functions(space: bool, margin:
                 assert least == pytest.approx(expected, abs=near) or boxes and least > expected > 0
         assert space or not (found.point[:, 2].any() or found.normal[:, 2].any())
     assert counts >= ({1, 3, 4, 8} if space and margin > 1.0 else {1, 2})
+
+
+def test_boxes_in_space_overlap_as_coal_says() -> None:
+    """Depth of two boxes at random, where a face decides and where edges do."""
+    coal = pytest.importorskip("coal")
+    rng = np.random.default_rng(0)
+    compared = 0
+    for _ in range(200):
+        sizes = rng.uniform(0.5, 1.5, size=(2, 3))
+        axes = np.array([np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(2)])
+        axes *= np.sign(np.linalg.det(axes))[:, None, None]
+        origins = np.array([np.zeros(3), rng.normal(scale=0.6, size=3)])
+        shapes = make_shapes(
+            [Shape(BOX, k, half_size=0.5 * size) for k, size in enumerate(sizes)], True
+        )
+        found = ContactFinder(shapes, candidate_pairs(shapes)).find(axes, origins)
+        one, other = (coal.Box(*size) for size in sizes)
+        result = coal.CollisionResult()
+        poses = [coal.Transform3s(axes[k], origins[k]) for k in range(2)]
+        if not coal.collide(one, poses[0], other, poses[1], coal.CollisionRequest(), result):
+            assert not len(found.gap) or found.gap.min() > -1e-6
+            continue
+        depth = result.getContact(0).penetration_depth
+        compared = compared + 1
+        assert found.gap.min() == pytest.approx(depth, abs=1e-6 + 0.05 * abs(depth))
+    assert compared > 50
 
 
 @SPACES
