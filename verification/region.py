@@ -62,23 +62,23 @@ class Region:
         return min(tested) if low is None else low, max(tested) if high is None else high
 
     def __str__(self) -> str:
-        """The bounds, such as "tilt <= 0.015 rad"."""
+        """The bounds, such as "tilt ≤ 0.859°"; angles are in degrees."""
         return " and ".join(_bound(*bound) for bound in self.bounds)
 
 
 def _bound(key: str, unit: str, low: float | None, high: float | None) -> str:
     key = key.replace("_", " ")
-    least = "" if low is None else _inward(low, math.ceil)
-    most = "" if high is None else _inward(high, math.floor)
+    angle = unit == "rad"
+    scale = math.degrees(1.0) if angle else 1.0
+    least = "" if low is None else _inward(low * scale, math.ceil)
+    most = "" if high is None else _inward(high * scale, math.floor)
     if low == high:
-        return f"{key} = {least} {unit}".rstrip()
-    if not least:
-        return f"{key} <= {most} {unit}".rstrip()
-    return (
-        f"{least} <= {key} <= {most} {unit}".rstrip()
-        if most
-        else f"{key} >= {least} {unit}".rstrip()
-    )
+        said = f"{key} = {least}"
+    elif not most:
+        said = f"{key} ≥ {least}"
+    else:
+        said = f"{least} ≤ {key} ≤ {most}" if least else f"{key} ≤ {most}"
+    return f"{said}°" if angle else f"{said} {unit}".rstrip()
 
 
 def _inward(end: float, rounded: Callable[[float], int]) -> str:

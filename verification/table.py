@@ -13,7 +13,6 @@ Row = Mapping[str, Any]
 HOLDS = "holds"  # heading of the outcomes in printed tables
 WORDS = {True: "yes", False: "no", None: "cannot tell"}  # words for the outcomes
 _UNIT = re.compile(r"^(?P<key>.*\S) \[(?P<unit>[^\[\]]+)\]$")
-_LISTED = 8  # if there are more values, only the smallest and largest are printed
 
 
 @dataclass(frozen=True)
@@ -213,23 +212,3 @@ def by_part(table: Table) -> dict[str, Table]:
     return {part: table.only(name == part for name in names) for part in dict.fromkeys(names)} or {
         "": table
     }
-
-
-def ranges(table: Table) -> str:
-    """Return the conditions of a table in words: each with its values, or with its range if there
-    are many."""
-    return "; ".join(
-        f"{column.key.replace('_', ' ')} {span} {column.unit}".rstrip()
-        for column in table.columns
-        if column.condition and (span := _span(table.column(column.key)))
-    )
-
-
-def _span(values: Sequence[Any]) -> str:
-    found = {value for value in values if value is not None}
-    if any(isinstance(value, str) for value in found):
-        return ", ".join(sorted(map(str, found)))
-    ordered = sorted(found)
-    if len(ordered) > _LISTED:
-        return f"{ordered[0]:g} to {ordered[-1]:g}"
-    return ", ".join(f"{value:g}" for value in ordered)

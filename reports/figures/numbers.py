@@ -48,7 +48,8 @@ def format_cell(value: Any, digits: int = 4) -> str:
     if isinstance(value, int):
         return f"{value:,}".replace("-", MINUS)
     if isinstance(value, float):
-        return format_number(value, digits)
+        text = format_number(value, digits)
+        return text.rstrip("0").rstrip(".") if "." in text and "·" not in text else text
     return str(value)
 
 

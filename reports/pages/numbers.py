@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from reports.figures.numbers import format_number
 from reports.pages.records import Evidence
 from verification.numbers import read_values
+from verification.table import Table
 
 ABSENT = "not computed in this run"
 NARROW = "\N{NARROW NO-BREAK SPACE}"
@@ -115,7 +117,25 @@ def log_place(value: float, least: float, most: float) -> str:
     return f"{100.0 * min(share, 1.0):.1f}%"
 
 
+def in_degrees(table: Table) -> Table:
+    """Return a table with its angles in degrees."""
+    turned = [column.unit in ("rad", "rad/s") for column in table.columns]
+    columns = [
+        replace(column, unit=column.unit.replace("rad", "°")) if turns else column
+        for column, turns in zip(table.columns, turned, strict=True)
+    ]
+    rows = [
+        tuple(
+            math.degrees(value) if turns and value is not None else value
+            for value, turns in zip(row, turned, strict=True)
+        )
+        for row in table.rows
+    ]
+    return replace(table, columns=tuple(columns), rows=tuple(rows))
+
+
 FILTERS = {
+    "in_degrees": in_degrees,
     "num": num,
     "percent": percent,
     "times": times,

@@ -56,8 +56,8 @@ ALL_THREE = "together"
 # [m] √(inertia / mass) of the peg: the length of (x, y, θ) in the kinetic metric is √(x² + y² +
 # (ARM θ)²)
 ARM = 0.05
-OVERLAP = "overlap of the device's peg"
-SETTLING = "settling time"
+OVERLAP = "overlap"
+SETTLING = "time to rest"
 # A trial cannot tell which world is closer to ideal if the lead of IAPB over its nearer rival is
 # below these bands: in RMS distance of the path [m, rad], and in mean distance of the force [N, N
 # m]. With the ideal world at four times the rate the lead changes by at most 7.9e-6, 2.0e-5, 2.9e-3
@@ -72,7 +72,7 @@ RESOLVED[ALL_THREE] = float(
 NAMED = {"x": "x", "y": "y", "rotation": "rotation", ALL_THREE: "all three together"}
 LIMITED = (*START, "force_limit")
 PAPERS = Condition().collision_threshold
-LARGER = "with a larger collision threshold"
+LARGER = "larger threshold"
 WORLDS = ("IAPB", "PB", "CBuc")
 RENDERINGS = ("saturate", "scale", "spread")
 
@@ -190,8 +190,8 @@ def of_setting(part: str, condition: Condition) -> str:
 
 
 PUSHING = "IAPB-push"  # the world whose impulses cannot pull
-NEARER = "pushing only: nearer to the rigid wall than IAPB"
-NEAREST = "pushing only: nearer than spring and coupler"
+NEARER = "pushing only beats IAPB"
+NEAREST = "pushing only beats both rivals"
 
 
 def _trajectory(study: Study, condition: Condition) -> Iterator[Row]:
@@ -236,8 +236,8 @@ C10 = peg_claim(
 # C11: the forces
 
 LARGE = "peak force"
-BALANCE = "distance from balance in contact"
-CLOSEST = "force, mean distance to ideal"
+BALANCE = "out of balance"
+CLOSEST = "force to ideal"
 # Forces and their distances below this [N, N m] are rounding: no force acts along this coordinate.
 NOTHING = 1e-9
 # An impulse p acts as the force p/Δt over one step, and may come a step later than in the ideal
@@ -294,9 +294,9 @@ C11 = peg_claim(
 
 # C12: renderings on a device with force limits
 
-MOST = "saturating loses most"
-LEAST = "spreading loses least"
-INCREASES = "saturating increases it"
+MOST = "clipped most"
+LEAST = "spread least"
+INCREASES = "clipped longer"
 
 
 def agreed(differences: Any) -> float:

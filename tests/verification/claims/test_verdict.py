@@ -67,7 +67,7 @@ def test_verdict_follows_from_the_trials(holds, verdict):
 
 def test_a_printed_range_never_exceeds_the_confirmed_one():
     assert str(Region((("jump", "", 1.0521, 1.4099), ("tilt", "rad", 0.00033331, 0.015)))) == (
-        "1.06 <= jump <= 1.4 and 0.000334 <= tilt <= 0.015 rad"
+        "1.06 ≤ jump ≤ 1.4 and 0.0191 ≤ tilt ≤ 0.859°"
     )
 
 
@@ -247,7 +247,7 @@ def drawn_by(holds, count=20):
 
 def test_a_region_that_is_there_is_found_and_confirmed_with_its_counts():
     part = judge_part("x", trials(gentle), drawn_by(gentle))
-    assert part.outcome == "holds where tilt <= 0.2 rad"
+    assert part.outcome == "holds where tilt ≤ 11.4°"
     assert part.region.share == pytest.approx(2 / 3) and part.region.fresh == 20
     assert part.region.searched + part.region.others == part.held
     half = judge_part(
@@ -258,14 +258,14 @@ def test_a_region_that_is_there_is_found_and_confirmed_with_its_counts():
 
 def test_a_region_may_bound_two_conditions():
     region = search_region(trials(lambda row: row["tilt"] >= 0.1 and 2.0 <= row["width"] <= 3.0))
-    assert str(region) == "tilt >= 0.1 rad and 2 <= width <= 3 m"
+    assert str(region) == "tilt ≥ 5.73° and 2 ≤ width ≤ 3 m"
 
 
 def test_a_second_condition_must_pay():
     region = search_region(
         trials(lambda row: row["tilt"] <= 0.15 or (row["tilt"] <= 0.2 and row["width"] == 1.0))
     )
-    assert str(region) == "tilt <= 0.15 rad"
+    assert str(region) == "tilt ≤ 8.59°"
 
 
 def test_fresh_trials_that_fail_refute_a_region_that_the_grid_holds():
@@ -288,7 +288,7 @@ def test_a_half_without_a_failure_hides_no_range():
     sizes = table([{"tilt [rad]": float(n)} for n in range(1, 28)], ()).judged(
         lambda row: row["tilt"] > 2.0
     )
-    assert str(judge_part("x", sizes).region) == "tilt >= 4 rad"
+    assert str(judge_part("x", sizes).region) == "tilt ≥ 230°"
 
 
 @pytest.mark.parametrize("share", [0.55, 0.75, 0.85])
@@ -304,7 +304,7 @@ def test_a_region_of_random_outcomes_is_not_confirmed(share):
 def test_a_part_that_fails_in_most_trials_may_hold_in_a_range():
     rare = lambda row: row["tilt"] <= 0.1  # noqa: E731
     part = judge_part("x", trials(rare), drawn_by(rare))
-    assert (part.verdict, str(part.region)) == (WHERE, "tilt <= 0.1 rad")
+    assert (part.verdict, str(part.region)) == (WHERE, "tilt ≤ 5.72°")
     assert (part.held, part.decided) == (20, 52)
     few = judge_part(
         "x", trials(lambda row: row["tilt"] <= 0.03), drawn_by(lambda row: row["tilt"] <= 0.03)
