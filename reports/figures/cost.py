@@ -1,13 +1,11 @@
-"""Error of whole motions against their computing time, and growth of an impact's time with its size."""
+"""Error of whole motions against their computing time."""
 
 from __future__ import annotations
 
 from reports.figures.figure import Drawn, Panel, recipe
 from reports.figures.plot import Plot, note
-from reports.figures.style import MUTED, STYLES, LineStyle
+from reports.figures.style import MUTED, STYLES
 from verification.cost import trajectories as motion
-from verification.cost.calls import PRINTED
-from verification.cost.growth import FACTORED, times_over
 from verification.cost.steps import IDEAL
 from verification.table import Table
 
@@ -47,22 +45,3 @@ def motions(table: Table) -> Drawn:
         told = f"{scene}: error against time; the smallest is {least['position']:.1g}, by {least['method']}."
         panels.append(Panel(plot.svg, told, scene))
     return Drawn(panels, table, {look.name: look for look in looks.values()})
-
-
-# varied -> what is held, and at what
-_HELD = {"contacts": ("coordinates", 12), "coordinates": ("contacts", 60)}
-_FORMS: dict[str, LineStyle] = {FACTORED: STYLES["factored"], PRINTED: STYLES["printed, numpy"]}
-
-
-@recipe("impact-scaling", "haptic-rate/C19")
-def impact_scaling(numbers: Table) -> Drawn:
-    """Draw the time over the number of contacts and over the number of coordinates."""
-    panels = []
-    for axis, (other, count) in _HELD.items():
-        with Plot(f"impact-scaling-{axis}") as plot:
-            for method, look in _FORMS.items():
-                plot.curve(times_over(numbers, method, axis, **{other: count}), look)
-            plot.log(axis, "time of one impact [µs]")
-        told = f"Time of one impact against the number of {axis}."
-        panels.append(Panel(plot.svg, told, f"{axis}, with {count} {other}"))
-    return Drawn(panels, numbers, {look.name: look for look in _FORMS.values()})

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from reports.figures.numbers import format_number
+from reports.figures.numbers import format_cell, format_number
 from reports.pages.records import Evidence
 from verification.numbers import read_values
 from verification.table import Table
@@ -102,8 +102,8 @@ def time(microseconds: float, digits: int = 3) -> str:
     """Return a time given in µs: in µs below 1 ms, in ms below 1 s, else in s."""
     for unit, factor in (("µs", 1.0), ("ms", 1e3)):
         if abs(microseconds) < 1e3 * factor:
-            return f"{format_number(microseconds / factor, digits)}{NARROW}{unit}"
-    return f"{format_number(microseconds / 1e6, digits)}{NARROW}s"
+            return f"{format_cell(microseconds / factor, digits)}{NARROW}{unit}"
+    return f"{format_cell(microseconds / 1e6, digits)}{NARROW}s"
 
 
 def place(value: float, most: float) -> str:

@@ -168,7 +168,7 @@ def test_a_page_quotes_numbers_by_key_and_a_missing_one_is_an_error_or_says_not_
         return _environment().from_string(text).render(numbers=numbers)
 
     quoted = "{{ numbers.exact_energy.impacts | num }} {{ numbers.exact_energy.step_us | time }}"
-    assert rendered(quoted) == "130,846 1.50\u202fms"
+    assert rendered(quoted) == "130,846 1.5\u202fms"
     assert rendered("{{ numbers.speed.any | num }}{{ numbers.speed.any > 3 }}") == f"{ABSENT}False"
     for wrong in ("numbers.exact_energy.impact | num", "numbers.speeds.any"):
         with pytest.raises(UndefinedError):
@@ -186,7 +186,7 @@ def test_numbers_have_one_format():
     assert [time(0.5512), time(1234.0), time(2.5e6)] == [
         "0.551\u202fµs",
         "1.23\u202fms",
-        "2.50\u202fs",
+        "2.5\u202fs",
     ]
     assert (percent(0.131), times(11.2)) == ("13\u202f%", "11×")
 
