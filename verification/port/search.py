@@ -6,7 +6,7 @@ and asks for the least other one. Cycles count with the energy of one round once
 what the search returns was drawn from rest, in full.
 
 The search tries chatter between pairs of points that a slow scan finds steep, turns (sines and
-ellipses), polygons with ramps, and random motions; then it improves the best of each speed for each
+ellipses), ramps to and fro, polygons and walks; then it improves the best of each speed for each
 goal, with changes of its shape, place, speed and points.
 """
 
@@ -34,6 +34,7 @@ LONG = 40_000  # samples of a motion that confirms a cycle, at first
 LONGEST = 360_000  # and at most, if that shows 0.2 % more
 FINEST = 1e-7  # smallest size of a cycle, as a share of the reach
 SLOWEST = 1000  # samples of a cycle of a hand of any speed
+STRAIGHT = 150  # samples of a sine along the only line there is; the scan is slower
 SCAN = 400  # samples of a scan from end to end
 SLOWER = 6  # loops, each at half the speed of the one before, that show that no damping is enough
 SMALLER = 10  # the same for pairs of points, each half as far apart
@@ -66,8 +67,8 @@ class Search:
     """One search: the port, where it starts, how far the hand goes, and what was found.
 
     fastest : largest frequency of the hand [Hz]; the search then uses turns only
-    best : of each goal, and of each speed (0: no cycle; 2 or 3 samples: 2; 4 to 7: 3; …) the best
-        motion
+    best : of each goal, and of each speed (0: no cycle; 2 samples: 2; 3 and 4: 3; 5 to 8: 4; …) the
+        best motion
     planes : (work, damped, rubbed) of motions from rest, less what was stored
     """
 
@@ -134,7 +135,7 @@ class Search:
     def try_on(self, motion: Motion, *goals: Goal) -> float:
         """Play a motion and keep it where it is the best; return what it needs of the last goal."""
         sums = self.sums(motion)
-        speed = len(motion.cycle).bit_length()
+        speed = max(0, 2 * len(motion.cycle) - 2).bit_length()
         value = -np.inf
         for goal in goals or self.goals:
             of_goal = self.best.setdefault(goal, {})
@@ -178,7 +179,7 @@ class Search:
     def look(self) -> None:
         """Try motions of every kind until CALLS calls of the law are made."""
         last = self.port.calls + self.effort * CALLS
-        for motion in () if self.slow else self.steep():
+        for motion in () if self.slow else itertools.chain(self.steep(), self.edges()):
             self.try_on(motion)
         for motion in self.drawn():
             if self.port.calls > last or self.late:
@@ -214,6 +215,17 @@ class Search:
                     k = int(goal.needed(pair).argmax())
                     yield self.motion(at[k : k + lag + 1 : lag], 20)
 
+    def edges(self) -> Iterator[Motion]:
+        """Yield chatter across the encoder's edges near the start, of many sizes."""
+        step = self.device.resolution
+        for k in range(4 if step > 0.0 else 0):
+            axis = k % len(self.start)
+            edge = self.start.copy()
+            edge[axis] = (np.floor(edge[axis] / step) + 0.5 + k) * step
+            for size in step * 10.0 ** -np.arange(0.3, 5.0, 0.5):
+                line = size * np.eye(len(edge))[axis]
+                yield self.motion(np.stack([edge + line, edge - line]), 40)
+
     def placed(self, shape: Floats) -> Floats:
         """Return a shape (p, d) in a random size and place, often near an earlier find or an edge of
         the encoder."""
@@ -246,7 +258,7 @@ class Search:
     def turn(self) -> Floats:
         """Return a sine, or an ellipse in more dimensions."""
         rng = self.rng
-        longest = self.slowest if len(self.start) > 1 or self.slow else 150
+        longest = self.slowest if len(self.start) > 1 or self.slow else STRAIGHT
         p = int(self.shortest * (longest / self.shortest) ** rng.random())
         turns = 1 if self.slow or rng.random() < 0.7 else int(rng.integers(1, 1 + p // 2))
         angle = 2.0 * np.pi * turns * np.arange(p)[:, None] / p + rng.uniform(0.0, 6.3)
