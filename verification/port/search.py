@@ -166,9 +166,7 @@ class Search:
     def motion(self, cycle: Floats, way: int = 0) -> Motion:
         """Return a motion with a cycle, inside the reach; `way`: samples of the lead-in."""
         cycle = np.clip(cycle - self.start, -self.device.reach, self.device.reach) + self.start
-        way = way or int(self.rng.choice(LEADS))
-        if self.slow:
-            way = 2 * self.shortest
+        way = 2 * self.shortest if self.slow else way or int(self.rng.choice(LEADS))
         share = np.sin(0.5 * np.pi * np.arange(1, way)[:, None] / way) ** 2
         lead = self.start + share * (cycle[0] - self.start)
         repeats = 2 * int(np.ceil(SETTLE / len(cycle)))
@@ -224,7 +222,7 @@ class Search:
             edge[axis] = (np.floor(edge[axis] / step) + 0.5 + k) * step
             for size in step * 10.0 ** -np.arange(0.3, 5.0, 0.5):
                 line = size * np.eye(len(edge))[axis]
-                yield self.motion(np.stack([edge + line, edge - line]), 40)
+                yield self.motion(edge + np.stack([line, -line]), 40)
 
     def placed(self, shape: Floats) -> Floats:
         """Return a shape (p, d) in a random size and place, often near an earlier find or an edge of
@@ -259,7 +257,9 @@ class Search:
         """Return a sine, or an ellipse in more dimensions."""
         rng = self.rng
         longest = self.slowest if len(self.start) > 1 or self.slow else STRAIGHT
-        p = int(self.shortest * (longest / self.shortest) ** rng.random())
+        p = int(
+            self.shortest * (longest / self.shortest) ** rng.random() ** (3 if self.slow else 1)
+        )
         turns = 1 if self.slow or rng.random() < 0.7 else int(rng.integers(1, 1 + p // 2))
         angle = 2.0 * np.pi * turns * np.arange(p)[:, None] / p + rng.uniform(0.0, 6.3)
         across = self.direction() * rng.choice([0.0, 1.0, rng.uniform()])
@@ -324,6 +324,7 @@ class Search:
         while not (self.late or failed > 50 * len(self.start) or self.port.calls > last):
             cycle = self.changed(best.cycle, 10.0 ** self.rng.uniform(-2.5, 0.0))
             if np.ptp(cycle, axis=0).max() < FINEST * self.device.reach:
+                failed += 1
                 continue
             way = 0 if self.rng.random() < 0.1 else len(best.lead) + 1
             tried = self.motion(cycle, way)
@@ -385,7 +386,7 @@ class Search:
         needed = goal.needed(sums, self.stored)
         at = int(needed.argmax())
         work = float(sums.work[at] - sums.rounding[at] - self.stored)
-        self.planes.append((work, float(sums.damped[at]), float(sums.rubbed[at])))
+        self.planes.append((work, sums.damped[at], sums.rubbed[at]))
         return Found(float(needed[at]), motion)
 
     def unbounded(self, goal: Goal, one: Found) -> bool:
