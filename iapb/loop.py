@@ -107,10 +107,9 @@ def _write_tables(record, step, state):
     for i in range(state.contact_count[0]):
         line.body_a[m] = contacts.body_a[i]
         line.body_b[m] = contacts.body_b[i]
-        # a contact that strikes and moves on within the step is recorded where it struck
-        struck = state.contact_impulse[i] != 0.0
-        store(line.point, m, load(contacts.struck_point if struck else contacts.point, i))
-        store(line.normal, m, load(contacts.struck_normal if struck else contacts.normal, i))
+        moved = contacts.moved[i]
+        store(line.point, m, load(contacts.struck_point if moved else contacts.point, i))
+        store(line.normal, m, load(contacts.struck_normal if moved else contacts.normal, i))
         store(line.friction_force, m, load(contacts.friction_force, i))
         line.gap[m] = contacts.gap[i]
         line.normal_velocity[m] = contacts.normal_velocity[i]

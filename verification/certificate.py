@@ -73,7 +73,7 @@ class Certificate:
         relative to the sum of their sizes. It is 1 if a step has an impulse and no impact, and NaN
         if no steps are recorded.
     restitution : largest |J v⁺ + e J v⁻| of the contacts with an impulse, relative to |J||v⁻|; NaN
-        if the law does not require J v⁺ = −e J v⁻. Where impacts of a step move the same bodies one
+        if no impact has to meet J v⁺ = −e J v⁻. Where impacts of a step move the same bodies one
         after the other, it is not judged. Nor are impacts of several contacts by Poisson's law.
     restitution_judged : whether a large restitution residual makes the certificate fail. This holds
         for law (21) without options, one scalar e, and only independent rows. Otherwise the

@@ -24,6 +24,7 @@ from iapb.advice.loops import MARGIN, SOON, HapticLoop, hold, nearest, scaled
 from iapb.contact import geometry, laws
 from iapb.contact.finding import Contacts
 from iapb.contact.kernels.implicit import COMPLIANCE, FADING
+from iapb.contact.kernels.touch import MOST_SAMPLES
 from iapb.contact.solids import joined
 from iapb.names import in_metres
 from iapb.numerics.schema import Floats, Integers
@@ -423,8 +424,7 @@ def check_scene(
     start = Start(scene)
     uses = frozenset[str](getattr(chosen, "uses", ()))
     found = [*_degrees(scene), *_inertias(scene), *_overlaps(start)]
-    if laws.IMPULSES not in uses or not scene.contact.at_touch:
-        found += _fast(start)
+    found += _fast(start, laws.IMPULSES in uses and scene.contact.at_touch, coupling != "none")
     if laws.PENALTY in uses and not scene.contact.rigid:
         found += _sags(start)
     integrator = getattr(chosen, "integrator", "semi_implicit_euler")
@@ -568,13 +568,20 @@ def _too_deep(start: Start, rows: Rows, resting: float) -> bool:
     return bool(depth > DEEP * size or depth > 1e-6 * size and 0.5 * K * np.sum(gap**2) > usual)
 
 
-def _fast(start: Start) -> Iterator[Caution]:
-    """Warn of bodies that move by more than half of a shape in the step of the impact."""
+def _fast(start: Start, at_touch: bool, coupled: bool) -> Iterator[Caution]:
+    """Warn of bodies that move by more than half of a shape in the step of the impact.
+
+    Where impacts happen at the touch, a step is searched at MOST_SAMPLES moments, but not that of a
+    tool with a coupling.
+    """
+    held = at_touch and coupled and start.scene.is_coupled
     for i in (int(rows[0]) for rows in start.by_pair):
         time, speed = (float(x[i]) for x in start.meeting)
         size = float(start.thickness[i])
         leaving = start.rows[i] @ start.v >= 0.0 and start.pull[i] >= 0.0
-        if leaving or time > start.scene.duration or speed * start.dt <= 0.5 * size:
+        searched = at_touch and not (held and start.rows[i, start.tool].any())
+        most = (0.5 * MOST_SAMPLES if searched else 0.5) * size
+        if leaving or time > start.scene.duration or speed * start.dt <= most:
             continue
         shapes = sorted(
             (start.found.shape_b[i], start.found.shape_a[i]), key=lambda s: start.size[s]
@@ -586,7 +593,7 @@ def _fast(start: Start) -> Iterator[Caution]:
             f"{other} meets {thin} at {speed:.3g} m/s, "
             f"{in_metres(speed * start.dt)} in a step, and the thinner is {in_metres(size)}: it "
             f"sinks in or "
-            f"passes through; set rate >= {_up(4.0 * speed / size):g} Hz, or impacts at the touch",
+            f"passes through; set rate >= {_up(2.0 * speed / most):g} Hz",
         )
 
 

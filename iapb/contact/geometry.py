@@ -93,7 +93,8 @@ class ContactBuffer(NamedTuple):
     rolled: Annotated[Floats, "contact 3"]  # angle of a relative to b in the step, times the normal
     drift: Annotated[Floats, "contact 3"]  # [m] a relative to b since they stick
     span: Annotated[Floats, "contact"]  # [s] of the part of a step that `expected` is about
-    struck_point: Annotated[Floats, "contact 3"]  # [m] the point as it took its last impulse
+    moved: Annotated[Booleans, "contact"]  # it has moved on in the step since it struck
+    struck_point: Annotated[Floats, "contact 3"]  # [m] where it struck, if it has moved on
     struck_normal: Annotated[Floats, "contact 3"]  # the normal then
     lift: Annotated[Floats, "contact"]  # [m] that it would bend off its support in this part
     idle: Annotated[Booleans, "contact"]  # takes no part in the present part of a step

@@ -31,6 +31,7 @@ from reference.rigid_step import (
 from reference.time_stepping import RigidConstraints
 from reference.worlds import find_world, run_world
 from tests.reference.scenes import scene_of
+from verification.certificate import certify
 
 DT = 1.0 / 512
 BAR = np.diag([1.0, 1.0 / 12.0])
@@ -404,3 +405,12 @@ def test_a_scene_with_a_hand_keeps_its_step_and_a_blow_at_the_start_its_place() 
     exact = 0.1 - 0.1 - 0.5 * 9.81 * 0.1**2
     assert ways[0] == pytest.approx(exact, rel=1e-12)
     assert ways[1] == pytest.approx(exact - 0.5 * 9.81 * 1e-3 * 0.1, rel=1e-12)
+
+
+@pytest.mark.parametrize("world", ["ideal", "CBuc"])
+def test_the_record_of_a_rigid_world_has_the_places_of_its_impulses(world: str) -> None:
+    run = run_world("peg_corner", world)
+    struck = run.contacts.impulse != 0.0
+    assert struck.any()
+    np.testing.assert_allclose(np.linalg.norm(run.contacts.normal[struck], axis=1), 1.0)
+    assert certify(run).span < 1e-12

@@ -141,11 +141,10 @@ class Port:
         self.size = size
         self.calls = 0
         self.changed = 0  # motions in which the law changed its arguments
-        self.play: Callable[..., Any] = self.answer  # a process of its own may take its place
 
     def forces(self, positions: Floats) -> Floats:
         """Return the forces (n, d) [N] at positions (n, d); raises ResolverFault."""
-        answer = answer_of(self.play, (positions.ravel(),))
+        answer = answer_of(self.answer, (positions.ravel(),))
         if isinstance(answer, ResolverFault):
             raise answer
         self.calls += len(positions)

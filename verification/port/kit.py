@@ -132,11 +132,12 @@ class ForceReport(Report):
 
     def _needs(self) -> Iterator[str]:
         device = self.device
-        enough = f"{self.damping_needed:.4g} N s/m"
+        least = "at least " if self.unfinished else ""
+        enough = f"{least}{self.damping_needed:.4g} N s/m"
         if self.damping_needed == np.inf:
             enough = "more than any damping"
         yield f"  any hand: it needs {enough} (with {device.friction:g} N of friction),"
-        yield f"            or {self.friction_needed:.4g} N of friction (with {device.damping:g} N s/m)"
+        yield f"            or {least}{self.friction_needed:.4g} N of friction (with {device.damping:g} N s/m)"
         if self.slow_damping is not None:
             yield f"  hands slower than {self.fastest:g} Hz: {self.slow_damping:.4g} N s/m (measured)"
 
@@ -224,7 +225,11 @@ def check_force(
     for done, _ in enumerate(trial.stages(fastest, edge)):
         if progress is not None:
             progress(done + 1, len(STAGES))
-    late = search.late and not search.fault
+    unfinished = ""
+    if search.fault and "finite" not in chosen:
+        unfinished = f"it gave no force in a motion of the search: {search.fault}"
+    if search.late and not search.fault:
+        unfinished = f"too slow: the search did not end in {patience:g} s; numbers are lower bounds"
     return ForceReport(
         name_of(law),
         device,
@@ -240,7 +245,7 @@ def check_force(
         law,
         port.calls,
         time.monotonic() - began,
-        f"too slow: the search did not end in {patience:g} s" if late else "",
+        unfinished,
     )
 
 
@@ -282,16 +287,26 @@ class _Trial:
                 if one.motion is not None:
                     self.judge(name, one.motion)
         yield
-        if fastest is not None:
+        if fastest is not None and not search.late:
             effort = SLOW_EFFORT * search.effort
             slow = replace(
                 search, goals=(damping_goal,), fastest=fastest, best={}, planes=[], effort=effort
             )
             self.slow = self.searched(slow).needed
+            self.take_fault(slow)
         yield
-        if edge:
+        if edge and not search.late:
             self.edge = self.edge_found()
         yield
+
+    def take_fault(self, other: Search) -> None:
+        """Take over what went wrong in a search of its own."""
+        search = self.search
+        if other.fault and not search.fault:
+            search.fault = other.fault
+            search.motion_of_fault = other.motion_of_fault
+            if other.motion_of_fault.motion is not None:
+                self.judge("finite", other.motion_of_fault.motion)
 
     def most(self, goal: Goal) -> Found:
         """Improve the best motions for a goal; return the best from rest."""
@@ -323,7 +338,9 @@ class _Trial:
         own = replace(self.search, goals=(goal,), best={}, longest=LONG, effort=effort)
         for motion in self.known():
             own.try_on(motion)
-        return self.searched(own)
+        best = self.searched(own)
+        self.take_fault(own)
+        return best
 
     def known(self) -> list[Motion]:
         """Return the best motions of all speeds for all goals."""

@@ -363,11 +363,15 @@ class Search:
     # what was found
 
     def confirmed(self, goal: Goal) -> Found:
-        """Return the motion from rest that needs most: the best cycles are repeated for long."""
+        """Return the motion from rest that needs most: the best cycles are repeated for long.
+
+        When the time is over, the best one is still played once: what it needs is a lower bound.
+        """
         best = Found(0.0)
         for one in self.ranked(goal)[:4]:
             for samples in (LONG, self.longest):
-                if one.needed > 1.002 * best.needed and not self.late:
+                in_time = best.motion is None or not self.late
+                if one.needed > 1.002 * best.needed and in_time:
                     tried = self.from_rest(goal, one, round(self.effort * samples))
                     best = max(best, tried, key=lambda own: own.needed)
         return best

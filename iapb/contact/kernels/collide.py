@@ -29,7 +29,7 @@ from iapb.contact.kernels.rows import (
 from iapb.contact.kernels.shape_frames import copy_contact
 from iapb.contact.kernels.unilateral import poisson_impact
 from iapb.numerics.compiled import copy_into, kernel
-from iapb.numerics.linalg import dot_of, load, store
+from iapb.numerics.linalg import dot_of, load
 from iapb.run import COLLIDING
 
 # share of |u|, and of the largest impulse, above which a contact opens or pulls: far above rounding
@@ -333,8 +333,7 @@ def resolve_island(world, state, island):
             before = state.contact_impulse[i]
             state.contact_impulse[i] = impulse if before == 0.0 else before + impulse
             if impulse != 0.0:
-                store(state.contacts.struck_point, i, load(state.contacts.point, i))
-                store(state.contacts.struck_normal, i, load(state.contacts.normal, i))
+                state.contacts.moved[i] = False
         gamma = 0.0
         for k in range(size):
             gamma += work.rows[k, r] * (work.u[k] + applied * work.change[k])

@@ -83,6 +83,7 @@ def present_contacts(world, state, contacts, before, count_before):
         contact_velocities(world.mechanism, state.body, state.v, contacts, count)
         mark_new(contacts, count, before, count_before, world.coherence_distance, world.rigid)
         contacts.idle[:count] = False
+        contacts.moved[:count] = False
         contacts.lift[:count] = 0.0
         if world.switches.supports:
             count = leave_out_seams(world, state, contacts, count)

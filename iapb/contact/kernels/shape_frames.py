@@ -164,6 +164,7 @@ def copy_found(to, i, contacts, j):
     copy_contact(to, i, contacts, j)
     to.is_new[i] = contacts.is_new[j]
     to.idle[i] = contacts.idle[j]
+    to.moved[i] = False
     to.normal_velocity[i] = contacts.normal_velocity[j]
     to.lift[i] = 0.0
     store(to.tangential_velocity, i, load(contacts.tangential_velocity, j))
@@ -180,6 +181,7 @@ def copy_all(to, i, contacts, j):
     to.expected[i] = contacts.expected[j]
     to.span[i] = contacts.span[j]
     to.lift[i] = contacts.lift[j]
+    to.moved[i] = contacts.moved[j]
     store(to.struck_point, i, load(contacts.struck_point, j))
     store(to.struck_normal, i, load(contacts.struck_normal, j))
     store(to.friction_force, i, load(contacts.friction_force, j))

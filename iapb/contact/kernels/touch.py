@@ -653,8 +653,12 @@ def take_contacts(world, state):
         if old >= 0:
             begin = old + 1
             state.contact_impulse[kept] = state.row_impulse[old]
-            store(now.struck_point, kept, load(before.struck_point, old))
-            store(now.struck_normal, kept, load(before.struck_normal, old))
+            now.moved[kept] = state.row_impulse[old] != 0.0
+            again = before.moved[old]
+            store(now.struck_point, kept, load(before.struck_point if again else before.point, old))
+            store(
+                now.struck_normal, kept, load(before.struck_normal if again else before.normal, old)
+            )
         kept += 1
     state.contact_count[0] = kept
     return True

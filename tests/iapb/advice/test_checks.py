@@ -158,6 +158,25 @@ WARNED: dict[str, tuple[Scene, list[str], list[str], list[dict[str, Any]]]] = {
             {"contact.forces": "implicit"},  # it strikes at the touch
         ],
     ),
+    "faster than a step is searched": (
+        scene(box(height=0.5, velocity=[0, -2000.0, 0]), walls=[PLATE], forces="implicit"),
+        ["fast"],
+        ["2e+03 m/s"],
+        [{"bodies.box_0.velocity": [0, -100.0, 0]}],
+    ),
+    "fast tool": (
+        scene(
+            box(height=0.5, velocity=[0, -100.0, 0]), walls=[PLATE], forces="implicit"
+        ).with_values(
+            {
+                "hand": {"body": "box_0"},
+                "couplings": {"four_channel": {"stiffness": [0.0] * 3, "damping": [0.0] * 3}},
+            }
+        ),
+        ["fast"],
+        ["rate >= 8100 Hz"],
+        [{"bodies.box_0.velocity": [0, -10.0, 0]}],
+    ),
     "implicit in space": (
         BALL,
         ["integrator"],

@@ -5,12 +5,14 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
+from itertools import permutations, product
 from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.optimize import nnls
 
 from iapb import resolve_frictional_impact, resolve_impact, resolve_impacts
 from reference.complementarity import ImpactProblem
@@ -500,3 +502,37 @@ def test_rows_of_friction_may_differ_in_size(decades: float) -> None:
         np.testing.assert_allclose(M @ (found.velocity - v), pushed, atol=1e-9 * size)
         if len(J) <= len(v) and plain.status == found.status == "complete":
             np.testing.assert_allclose(found.velocity, plain.velocity, atol=1e-7 * size)
+
+
+def poisson_with_least_compression(M: Floats, J: Floats, v: Floats, e: Floats) -> Floats:
+    """v⁺ of Poisson's law with the p_c ≥ 0 of least Σ W_ii p_c², by least squares: Aᵀp_c = Δu_c
+    weighs 1e6 times as much as p_c = 0."""
+    L = np.linalg.cholesky(M)
+    A = np.linalg.solve(L, J.T)
+    A = A / np.linalg.norm(A, axis=0)
+    u = L.T @ v
+    stopped = A @ nnls(A, -u)[0]
+    touching = A.T @ (u + stopped) < 1e-9 * np.linalg.norm(u)
+    goal = np.append(1e6 * stopped, np.zeros(len(J)))
+    p_c = nnls(np.vstack([1e6 * A * touching, np.eye(len(J))]), goal)[0]
+    returned = u + A @ ((1.0 + e) * p_c)
+    return np.asarray(np.linalg.solve(L.T, returned + A @ nnls(A, -returned)[0]))
+
+
+@pytest.mark.parametrize("every", [pytest.param(1, marks=pytest.mark.thorough), 17])
+@pytest.mark.parametrize("v", [[-1.0, 0.0, 0.0], [-1.0, 0.5, 0.25], [-2.0, 0.0, 3.0]])
+def test_the_order_of_four_corners_does_not_matter(v: list[float], every: int) -> None:
+    """A plate with e drawn from 0, 0.3, 0.8 and 1; with equal e the answer is that of one e."""
+    M = np.diag([1.3, 0.02, 0.03])
+    corners = np.array([[1.0, x, y] for x in (-0.2, 0.3) for y in (-0.1, 0.4)])
+    for e in np.array(list(product((0.0, 0.3, 0.8, 1.0), repeat=4)))[::every]:
+        first = resolve_impact(M, corners, v, e, method="poisson")
+        truth = poisson_with_least_compression(M, corners, np.array(v), e)
+        np.testing.assert_allclose(first.velocity, truth, atol=1e-8)
+        for order in permutations(range(4)):
+            rows = corners[list(order)] * [[1.0], [0.3], [70.0], [1.0]]
+            found = resolve_impact(M, rows, v, e[list(order)], method="poisson")
+            assert np.abs(found.velocity - first.velocity).max() <= 1e-12
+            assert exact_change(M, np.array(v), found.velocity) <= 0
+    alike = resolve_impact(M, corners, v, [0.3] * 4, method="poisson").velocity
+    assert np.array_equal(alike, resolve_impact(M, corners, v, 0.3, method="poisson").velocity)

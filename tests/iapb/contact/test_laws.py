@@ -173,3 +173,32 @@ def test_with_contacts_the_ledger_closes_as_the_step_goes_to_zero(
         through = np.abs(ledger["hand_work"]).max() + np.abs(ledger["impact_loss"]).max()
         residuals.append(np.abs(ledger["integration_residual"]).max() / through)
     assert residuals[1] < residuals[0] / 4.0 and residuals[1] < 0.01
+
+
+BOX: dict[str, Any] = {
+    "name": "box",
+    "joint": "planar",
+    "density": 100.0,
+    "shapes": [{"kind": "box", "size": [0.1, 0.1]}],
+    "position": [0.0, 0.051, 0.0],
+    "velocity": [0.5, -1.0, 0.0],
+}
+TILES = [
+    {"name": name, "kind": "box", "size": [0.5, 0.1], "center": [x, -0.05], "restitution": e}
+    for name, x, e in (("hard", -0.25, 0.8), ("soft", 0.25, 0.0))
+]
+
+
+@pytest.mark.parametrize("forces", ["paper", "implicit"])
+def test_a_box_on_a_hard_and_a_soft_tile_turns_whichever_comes_first(forces: str) -> None:
+    """Its left side bounces. Friction changes no normal velocity of the contacts that stay."""
+    contact = {"forces": forces, "stiffness": 1e4, "damping": 10.0, "friction": 0.3}
+    scene, turned = (scene_of([BOX], TILES[::way], contact=contact) for way in (1, -1))
+    first = simulate(scene).impacts.v_plus[0]
+    other = simulate(turned).impacts.v_plus[0]
+    np.testing.assert_allclose(first, other, atol=1e-12)
+    assert first[2] < -1.0 and 0.0 < first[1] < 0.8
+    if forces == "paper":
+        rough = simulate(scene, ImpulseAugmented(friction_in_impacts=True)).impacts.v_plus[0]
+        np.testing.assert_allclose(rough[1:], first[1:], atol=1e-12)
+        assert rough[0] < first[0] - 0.1

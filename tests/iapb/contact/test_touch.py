@@ -13,7 +13,7 @@ from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling
 from iapb.run import Run
 from iapb.scene import Scene, scene_from_text
 from iapb.scene.reading import scene_from_values
-from iapb.simulation import simulate
+from iapb.simulation import Simulation, simulate
 from verification.certificate import certify
 from verification.ordinary.touch import INERTIA, G, heights, toss_values, tossed
 
@@ -256,3 +256,12 @@ def test_corners_that_turn_past_each_other_are_not_taken_for_a_passage() -> None
     run = simulate(spinning_pair((329.25, 852.671), (-0.01064, 0.051, 0.558), 35.28))
     assert not len(run.impacts.step)
     assert not run.distrust
+
+
+def test_single_steps_give_the_bits_of_one_run() -> None:
+    scene = toss_scene(states(1, seed=5)[0], 500.0)
+    run = simulate(scene)
+    simulation = Simulation(scene)
+    for k in range(run.steps):
+        result = simulation.step()
+        assert (result.q == run.q[k + 1]).all() and (result.v == run.v[k + 1]).all()

@@ -100,6 +100,23 @@ def test_patience_ends_the_search_and_the_report_says_so():
     assert not report.passed and "NOT FINISHED" in report and "too slow" in report
 
 
+def test_what_was_found_in_time_is_a_lower_bound():
+    """The wall needs 3 N s/m; the time ends in the first scan, and slow hands are not looked at."""
+    report = check_force(wall, BareDevice(damping=2.9), patience=0.3, fastest=10.0)
+    assert 0.0 < report.damping_needed < 3.003 and "at least" in report
+    assert report.slow_damping is None
+
+
+def test_a_law_that_raises_says_so_whatever_laws_are_asked():
+    def narrow(x: float, v: float) -> float:
+        if x > 9.8e-3:
+            raise ValueError("beyond the table")
+        return wall(x, v)
+
+    report = check_force(narrow, BareDevice(damping=3.1), laws=["energy"], effort=QUICK)
+    assert not report.passed and "beyond the table" in report
+
+
 @pytest.mark.parametrize(
     ("name", "wrong"),
     [
