@@ -3,7 +3,7 @@
 In the project it is a file of reference/complementarity/solvers, and one line of `SOLVERS` there.
 
 Prints:
-    solved [ 0.1   0.15 -0.  ] True
+    solved [0.1, 0.15, 0.0] True
 """
 
 import numpy as np
@@ -33,4 +33,5 @@ SOLVERS["nnls"] = SolverEntry(__name__, "scipy", "non-negative least squares", "
 M, v = np.diag([2.0, 2.0, 0.005]), np.array([0.1, -0.3, 0.0])
 J = np.array([[0, 1, -0.01], [0, 1, 0.0], [0, 1, 0.01]])
 solution = solve_by_name(ImpactProblem.from_impact(M, J, v, restitution=0.5), "nnls")
-print(solution.verdict(), solution.velocity_plus.round(9), solution.residuals.worst < 1e-12)
+velocity = (solution.velocity_plus.round(9) + 0.0).tolist()  # no sign of zero
+print(solution.verdict(), velocity, solution.residuals.worst < 1e-12)
