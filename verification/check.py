@@ -5,9 +5,8 @@ Every study is one or more Checks. Its functions know only their case; the runne
 knows failures, progress, depth and tables. No verdict is written by hand: it follows from the
 outcomes of the rows.
 
-    Check.finding(study)          a claim: each part is judged, a region is searched where a part
-                                  is mixed
-    Topic(run, depth, progress)   a topic of the report: each check gives a table and its parts
+- `Check.finding(study)`: a claim; each part is judged, a region is searched where a part is mixed.
+- `Topic(run, depth, progress)`: a topic of the report; each check gives a table and its parts.
 """
 
 from __future__ import annotations
@@ -53,6 +52,8 @@ class Study:
     """What the functions of a check get: runs, the depth, the seed, and results that several checks
     share.
 
+    Attributes
+    ----------
     run : (scene, world, rendering) -> Run, made now or read from a store
     depth : "quick" or "full"; "full" has more cases
     seed : of random impacts and of fresh conditions
@@ -254,6 +255,8 @@ def _of_part(words: Mapping[str, str], name: str) -> str:
 class Topic:
     """A section of the report: a question and the checks that answer it.
 
+    Attributes
+    ----------
     key, title, question : as in `Finding`; checks : one table each, in the order of the report
     numbers, times : (tables by key of the check) -> the numbers that pages quote by key, and those
         that depend on measured times; see `verification.numbers`
