@@ -65,7 +65,11 @@ def port(
             edge=True,
             progress=lambda done, total: progress(STAGES[done - 1], done, total),
         )
-    map_file = write_map(FOLDER / f"{law.rpartition(':')[2]}.svg", report)
+    map_file = None
+    lines = [str(report)]
+    if len(report.edge):  # a law without forces, and a search out of time, have none
+        map_file = write_map(FOLDER / f"{law.rpartition(':')[2]}.svg", report)
+        lines.append(f"The map of devices: {map_file}")
     facts = {
         "law": report.law,
         "passed": report.passed,
@@ -76,9 +80,7 @@ def port(
         "map": map_file,
         "report": str(report),
     }
-    return Answer(
-        facts, [str(report), f"The map of devices: {map_file}"], 0 if report.passed else 1
-    )
+    return Answer(facts, lines, 0 if report.passed else 1)
 
 
 def _coordinates(start: str) -> float | list[float]:

@@ -114,7 +114,8 @@ class ForceReport(Report):
 
     def _text(self) -> str:
         device = self.device
-        word = "passed" if self.passed else "NOT FINISHED" if not self.broken_laws else "FAILED"
+        fails = self.broken_laws or self.damping_needed == np.inf
+        word = "passed" if self.passed else "FAILED" if fails else "NOT FINISHED"
         lines = [
             f"{self.law}: {word} on a device of {device.damping:g} N s/m and {device.friction:g} N "
             f"at {device.rate:g} Hz",
@@ -215,6 +216,8 @@ def check_force(
             raise ArgumentError(name, value, "a finite number above 0, or None")
     if not 0.0 <= stored < np.inf:
         raise ArgumentError("stored", stored, "a finite number, 0 or more")
+    if not isinstance(device, BareDevice):
+        raise ArgumentError("device", device, "a BareDevice")
     at = start_of(start)
     port = Port(law, device, len(at))
     goals = Goal(None, device.friction), Goal(device.damping, None)
@@ -228,6 +231,10 @@ def check_force(
     unfinished = ""
     if search.fault and "finite" not in chosen:
         unfinished = f"it gave no force in a motion of the search: {search.fault}"
+    if trial.damping == np.inf and "energy" in chosen and trial.verdicts["energy"].passed:
+        unfinished = (
+            "no damping is enough: a slower or smaller motion than those tried draws energy"
+        )
     if search.late and not search.fault:
         unfinished = f"too slow: the search did not end in {patience:g} s; numbers are lower bounds"
     return ForceReport(
@@ -279,6 +286,8 @@ class _Trial:
         damping_goal, friction_goal = search.goals
         most = [self.most(goal) for goal in search.goals]
         self.damping, self.friction = (one.needed for one in most)
+        other = search.from_rest(friction_goal, most[0], LONG)  # it needs some friction, too
+        self.friction = max(self.friction, other.needed)
         if search.unbounded(damping_goal, most[0]):
             self.damping = np.inf
         judged = {"energy": most, "bounded": [search.largest], "finite": [search.motion_of_fault]}

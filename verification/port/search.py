@@ -394,11 +394,15 @@ class Search:
         return Found(float(needed[at]), motion)
 
     def unbounded(self, goal: Goal, one: Found) -> bool:
-        """Whether no damping is enough: a loop needs twice as much at each half of its speed, or
-        chatter at each half of its size."""
-        if one.motion is None or not len(one.motion.cycle):
+        """Whether no damping is enough: a single pass gives as much at each half of its speed, a loop
+        needs twice as much, or chatter at each half of its size."""
+        if one.motion is None:
             return False
         cycle = one.motion.cycle
+        if self.gives_once(one.motion):
+            return True
+        if not len(cycle):
+            return False
         loop = resampled(cycle, int(np.clip(len(cycle), 24, 48)))
         slower = [resampled(loop, len(loop) * 2**k) for k in range(SLOWER)]
         if _doubles([self.settled(goal, copy) for copy in slower]):
@@ -411,6 +415,22 @@ class Search:
             found.append(values[best])
             pairs = halves_of(pairs[best])
         return _doubles(found)
+
+    def gives_once(self, motion: Motion) -> bool:
+        """Whether one pass of a motion gives as much energy at each half of its speed: what the law
+        had at the start, of which a slow hand loses nothing."""
+        path = np.vstack([motion.start, motion.lead, motion.cycle])
+        at = np.arange(len(path))
+        given = list[float]()
+        for k in range(SLOWER):
+            fine = np.linspace(0.0, at[-1], at[-1] * 2**k + 1)
+            line = np.stack([np.interp(fine, at, each) for each in path.T], axis=1)
+            sums = self.sums(Motion(motion.start, line[1:], motion.cycle[:0], 0))
+            if sums is None:
+                return False
+            given.append(float((sums.work - sums.rounding).max()) - self.stored)
+        last = given[-4:]
+        return last[0] > 0.0 and all(b > 0.9 * a for a, b in itertools.pairwise(last))
 
     def settled(self, goal: Goal, cycle: Floats) -> float:
         """Return what the last rounds of a cycle need, whatever came before."""

@@ -107,6 +107,25 @@ def test_what_was_found_in_time_is_a_lower_bound():
     assert report.slow_damping is None
 
 
+class Hysteresis:
+    """A wall that pushes out harder than it lets the hand in."""
+
+    def reset(self):
+        self.last = 0.0
+
+    def step(self, x, v):
+        stiffness = 500.0 if x >= self.last else 1000.0
+        self.last = x
+        return -stiffness * max(x, 0.0)
+
+
+@pytest.mark.parametrize("law", [lambda x, v: 1000.0 * max(x, 0.0), lambda x, v: 1.0, Hysteresis()])
+def test_no_damping_is_enough_for_a_law_that_gives_to_a_slow_hand(law):
+    """A wrong sign, a constant pull, a loop of force: a device of any damping must fail."""
+    report = check_force(law, BareDevice(damping=1000.0), laws=["energy"], effort=QUICK)
+    assert report.damping_needed == np.inf and not report.passed and "FAILED" in report
+
+
 def test_a_law_that_raises_says_so_whatever_laws_are_asked():
     def narrow(x: float, v: float) -> float:
         if x > 9.8e-3:
