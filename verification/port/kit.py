@@ -20,7 +20,7 @@ from verification.laws.counterexample import import_line, name_of, residual_of, 
 from verification.laws.kit import PATIENCE, Report, laws_named
 from verification.port.device import BareDevice, Motion, Port, start_of, sums_of
 from verification.port.laws import FORCE_LAWS, Terms, smaller_motions
-from verification.port.search import LONG, Found, Goal, Search, edge_of
+from verification.port.search import LONG, SLOWER, Found, Goal, Search, edge_of, one_pass
 
 MOTIONS = 40  # for the laws other than energy
 SLOW_EFFORT = 0.5  # of a whole search, in that for slow hands
@@ -290,6 +290,10 @@ class _Trial:
         self.friction = max(self.friction, other.needed)
         if search.unbounded(damping_goal, most[0]):
             self.damping = np.inf
+        if self.damping == np.inf and most[0].motion is not None:
+            slower = [one_pass(most[0].motion, 2**k) for k in range(SLOWER + 1)]
+            most += [search.from_rest(friction_goal, Found(motion=one), 0) for one in slower]
+            self.friction = max(self.friction, *(one.needed for one in most[1:]))
         judged = {"energy": most, "bounded": [search.largest], "finite": [search.motion_of_fault]}
         for name, ones in judged.items():
             for one in ones:

@@ -419,13 +419,9 @@ class Search:
     def gives_once(self, motion: Motion) -> bool:
         """Whether one pass of a motion gives as much energy at each half of its speed: what the law
         had at the start, of which a slow hand loses nothing."""
-        path = np.vstack([motion.start, motion.lead, motion.cycle])
-        at = np.arange(len(path))
         given = list[float]()
         for k in range(SLOWER):
-            fine = np.linspace(0.0, at[-1], at[-1] * 2**k + 1)
-            line = np.stack([np.interp(fine, at, each) for each in path.T], axis=1)
-            sums = self.sums(Motion(motion.start, line[1:], motion.cycle[:0], 0))
+            sums = self.sums(one_pass(motion, 2**k))
             if sums is None:
                 return False
             given.append(float((sums.work - sums.rounding).max()) - self.stored)
@@ -437,6 +433,15 @@ class Search:
         motion = self.motion(cycle, 40)
         sums = self.sums(motion)
         return -np.inf if sums is None else float(goal.needed(rounds_of(motion, sums))[0])
+
+
+def one_pass(motion: Motion, slower: int) -> Motion:
+    """Return one pass of a motion, so many times slower."""
+    path = np.vstack([motion.start, motion.lead, motion.cycle])
+    at = np.arange(len(path))
+    fine = np.linspace(0.0, at[-1], at[-1] * slower + 1)
+    line = np.stack([np.interp(fine, at, each) for each in path.T], axis=1)
+    return Motion(motion.start, line[1:], motion.cycle[:0], 0)
 
 
 def rounds_of(motion: Motion, sums: Sums) -> Sums:
