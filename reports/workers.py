@@ -111,7 +111,7 @@ def _cluster(address: str) -> Iterator[Executor]:
     for name in _LOUD:
         logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
-        client = Client(address, timeout="10s")
+        client = Client(address, timeout="30s")
     except (OSError, ValueError, TimeoutError) as error:
         raise ArgumentError("--dask", address, "the address of a running dask scheduler") from error
     try:

@@ -144,6 +144,7 @@ def test_two_processes_and_a_cluster_give_the_same_table(done, tmp_path):
         "n_workers": 2,
         "threads_per_worker": 1,
         "processes": False,
+        "memory_limit": None,  # of the process of the tests, which counts as a worker's
         "dashboard_address": None,
     }
     (tmp_path / "cluster").mkdir()
