@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -17,7 +16,6 @@ from iapb.mechanics.energy import FORCES, energy_of_run, last_of
 from iapb.numerics.schema import Floats
 from iapb.run import UNSOLVED, ContactTable, EffectRow, ImpactTable, Later, Run, digests
 from iapb.scene.model import SpatialScene
-from iapb.system import System
 from iapb.thinning import Thinned
 
 # bounds the memory of a chunk in scenes with many contacts (about 30 MB)
@@ -74,8 +72,6 @@ class Recorder:
         self.steps = 0  # number of all steps done
         self._thinned = Thinned(every) if every > 1 else None
         self._before: dict[str, float] = {}  # the energies at `first`
-        # state and energy of the whole run
-        self._at_first: tuple[dict[str, Floats], dict[str, float]] | None = None
 
     @property
     def bytes_per_step(self) -> int:
@@ -114,10 +110,7 @@ class Recorder:
         piece = self._held(world, stopped)
         ledger = self._ledger(piece)
         vars(piece)["energy"] = _shown(ledger, piece)
-        at_first = {name: getattr(piece, name)[0].copy() for name in ("q", "v")}
-        energy_at_first = {name: piece.energy[name][0] for name in ("kinetic", "potential")}
         thinned.add(piece, self.first, self._before, last)
-        self._at_first = self._at_first or (at_first, energy_at_first)
         self._before = last_of(ledger, self._before)
         self.start = {each.name: getattr(piece, each.name)[-1].copy() for each in STATES}
         self.records = []
@@ -163,7 +156,7 @@ class Recorder:
             "scene_resolved": Later(lambda run: scene.resolved()),
             "pose": Later(lambda run: mechanism.poses(run.q, planar=planar)),
             "energy": Later(lambda run: _shown(ledger(run), run)),
-            "distrust": Later(partial(_distrust, self._at_first, system)),
+            "distrust": Later(partial(distrust_of, system=system)),
         }
         remarks = system.remarks + (UNSOLVED,) * bool(simulation.state.rest_work.shortened[0])
         return Run(
@@ -235,21 +228,3 @@ def _shown(ledger: dict[str, Floats], run: Run) -> dict[str, Floats]:
     return {
         name: values for name, values in ledger.items() if name in _KEPT_WHEN_CARRIED or not carried
     }
-
-
-def _distrust(
-    at_first: tuple[dict[str, Floats], dict[str, float]] | None, system: System, part: Run
-) -> tuple[str, ...]:
-    """Return the distrust of a run; of a later part, as if its first state were that of the whole
-    run."""
-    if at_first is None:
-        return distrust_of(part, system)
-    states: dict[str, Any] = {
-        name: np.concatenate([state[None], getattr(part, name)[1:]])
-        for name, state in at_first[0].items()
-    }
-    ledger = {
-        name: np.concatenate([[value], part.energy[name][1:]])
-        for name, value in at_first[1].items()
-    }
-    return distrust_of(replace(part, energy=part.energy | ledger, distrust=(), **states), system)

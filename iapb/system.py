@@ -84,11 +84,10 @@ class System:
         self.tool_dofs = (0, 0)
         self.tool_coordinates = (0, 0)
         if scene.hand is not None:
-            trees = self.mechanism.tree_of_body
-            self.tool_tree = int(trees[self.mechanism.index(scene.hand.body)])
-            start = int(self.mechanism.arrays.q_start[trees == self.tool_tree].min())
+            held = self.mechanism.index(scene.hand.body)
+            self.tool_tree = int(self.mechanism.tree_of_body[held])
             self.tool_dofs = self.mechanism.tree_dofs[self.tool_tree]
-            self.tool_coordinates = start, start + self.device_mechanism().nq
+            self.tool_coordinates = self.mechanism.tree_coordinates[self.tool_tree]
         self._worlds: dict[Any, World] = {}
 
     def device_mechanism(self) -> Mechanism:
@@ -143,7 +142,6 @@ class System:
             contacts=not on.isdisjoint(_OF_CONTACTS),
         )
         ranges = np.array(mechanism.tree_dofs, np.int64).reshape(-1, 2)
-        own = [0 if body.mimic else body.joint.layout.nq for body in mechanism.bodies]
         stiffness, damping = contact.gains
         restitution = contact.restitution
         if len(self.restitutions) == 1:
@@ -158,8 +156,8 @@ class System:
                 tree_of_body=mechanism.tree_of_body,
                 tree_start=np.ascontiguousarray(ranges[:, 0]),
                 tree_stop=np.ascontiguousarray(ranges[:, 1]),
-                tree_of_coordinate=np.repeat(mechanism.tree_of_body, own),
-                tree_of_dof=mechanism.tree_of_body[mechanism.arrays.dof_body[: mechanism.nv]],
+                tree_of_coordinate=mechanism.tree_of_coordinate,
+                tree_of_dof=mechanism.tree_of_dof,
                 tree_mass=scene_parts.tree_masses(scene, mechanism),
                 switches=switches,
                 dt=self.dt,

@@ -6,6 +6,7 @@ M(q) dv/dt + B(q, v) + G(q) = J^T F, for several trees at once: M = blockdiag(M_
 
 from __future__ import annotations
 
+import itertools
 import threading
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -63,6 +64,12 @@ class _Scratch(threading.local):
         self.parts: Any = block(make_workspace(parts, dofs))
 
 
+def _ranges(tree: Integers, count: int) -> list[tuple[int, int]]:
+    """Return the range (start, stop) of each tree among entries of which each has a tree."""
+    edges = np.searchsorted(tree, np.arange(count + 1)).tolist()
+    return list(itertools.pairwise(edges))
+
+
 class Mechanism:
     """Trees of rigid bodies.
 
@@ -86,9 +93,9 @@ class Mechanism:
         The bodies as contiguous arrays for the kernels.
     motions : int
         nv, and one for each joint that follows another one.
-    tree_of_body : (n,) int array
-    tree_dofs : list of (start, stop)
-        Range in v of each tree; empty for a tree of fixed bodies.
+    tree_of_body, tree_of_coordinate, tree_of_dof : (n,), (nq,) and (nv,) int arrays
+    tree_coordinates, tree_dofs : list of (start, stop)
+        Range in q and in v of each tree; empty for a tree of fixed bodies.
     has_constant_mass_matrix, has_velocity_terms : bool
         See `iapb.mechanics.structure`.
     block : `arrays` in the memory layout of the kernels, built once
@@ -119,12 +126,12 @@ class Mechanism:
         self.arrays: MechanismArrays = structure.collect_arrays(self.bodies, parents)
         self.block: Any = block(self.arrays)
         self.tree_of_body: Integers = np.array(trees, np.int64)
-        moved = self.tree_of_body[self.arrays.dof_body[: self.nv]]
-        counts = np.bincount(moved, minlength=1 + max(trees, default=-1))
-        stops = np.cumsum(counts)
-        self.tree_dofs: list[tuple[int, int]] = list(
-            zip((stops - counts).tolist(), stops.tolist(), strict=True)
-        )
+        own = [0 if body.mimic else body.joint.layout.nq for body in self.bodies]
+        self.tree_of_coordinate: Integers = np.repeat(self.tree_of_body, own)
+        self.tree_of_dof: Integers = self.tree_of_body[self.arrays.dof_body[: self.nv]]
+        count = 1 + max(trees, default=-1)
+        self.tree_coordinates = _ranges(self.tree_of_coordinate, count)
+        self.tree_dofs = _ranges(self.tree_of_dof, count)
         parts = structure.moving_parts(self.arrays)
         self._parts: Any = block(parts)
         self.motions = len(self.arrays.dof_body)
