@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from iapb.mechanics.mechanism import Mechanism
 from iapb.numerics.schema import Floats, blank, quantities, zeros_of
 from iapb.run import ContactTable, EffectRow, ImpactTable, Run
-from iapb.scene.mechanism import mechanism_of, wrench_of
+from iapb.scene.mechanism import gravity_of, hand_force_of, mechanism_of
 from iapb.scene.model import Scene, SpatialScene
 
 Progress = Callable[[int, int], None]
@@ -113,8 +113,7 @@ def run_of_states(
     places = np.ascontiguousarray(q, np.float64)
     rates = np.ascontiguousarray(v, np.float64)
     steps = len(places) - 1
-    gravity = np.array([*(scene.gravity or ()), 0.0, 0.0, 0.0])[:3]
-    kinetic, potential = mechanism.energies(places, rates, gravity)
+    kinetic, potential = mechanism.energies(places, rates, gravity_of(scene))
     work = _work_of_the_hand(scene, mechanism, places)
     lengths = {
         "time": steps + 1,
@@ -164,13 +163,8 @@ def run_of_states(
 def _work_of_the_hand(scene: Scene, mechanism: Mechanism, q: Floats) -> Floats:
     """Return the work (n,) [J] of the hand's force up to the end of each step: the sum of F ·
     Δq."""
-    forces = np.zeros((len(q) - 1, mechanism.nv))
-    if scene.hand is not None:
-        body = mechanism.index(scene.hand.body)
-        point = np.array([*scene.hand.point, 0.0])[:3]
-        for k in range(len(forces)):
-            wrench = wrench_of(scene, (k + 0.5) * scene.step)
-            lever = mechanism.placements(q[k])[0][body] @ point
-            wrench[3:] += np.cross(lever, wrench[:3])
-            forces[k] = mechanism.frame_jacobian(q[k], body).T @ wrench
+    middles = (np.arange(len(q) - 1) + 0.5) * scene.step
+    forces = np.zeros((len(middles), mechanism.nv))
+    for k, time in enumerate(middles.tolist() if scene.hand is not None else ()):
+        forces[k] = hand_force_of(scene, mechanism, q[k], time)
     return np.cumsum(np.einsum("nd,nd->n", forces, mechanism.displacements(q)))

@@ -78,7 +78,7 @@ class System:
         self.restitutions = scene_parts.restitutions_of(scene, self.pairs)
         self.frictions = scene_parts.frictions_of(scene)
         self.dt = 1.0 / scene.rate
-        self.gravity = np.array([*(scene.gravity or ()), 0.0, 0.0, 0.0])[:3]
+        self.gravity = scene_parts.gravity_of(scene)
         self.tangents = 2 if isinstance(scene, SpatialScene) else 1
         self.tool_tree = -1
         self.tool_dofs = (0, 0)

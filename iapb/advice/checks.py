@@ -12,6 +12,7 @@ approach, so k must not exceed 1 either. `iapb.advice.distrust` checks the run i
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -29,8 +30,9 @@ from iapb.contact.solids import joined
 from iapb.names import in_metres
 from iapb.numerics.schema import Floats, Integers
 from iapb.scene import Scene, SpatialScene, mechanism
-from iapb.scene.bodies import inertia_matrix
+from iapb.scene.bodies import WORLD, filled_with, inertia_matrix
 from iapb.scene.model import MAX_RATE, Gains, Hand
+from iapb.scene.parts import Path
 from iapb.system import system_of
 
 Rows = Integers  # numbers of contacts
@@ -47,6 +49,9 @@ FEWER = [0.96**n for n in range(1, 300)]  # factors of gains and of the step, in
 MOVED = 0.1  # s: within which the hand gives the tool the speed that one step of a sensor must not
 SHAKEN = 0.1  # share of this speed that one step of the sensors may cause
 _UNITS = {"stiffness": "N/m", "damping": "N s/m"}
+# a free body has up to so many times the inertia of its shapes, or as little
+STRANGE = 100.0
+ROUND = (geometry.CIRCLE, geometry.SPHERE)
 MANY_PAIRS = 2000  # with more pairs, only those closer than the largest body are checked
 
 
@@ -127,11 +132,6 @@ class Start:
     def kind(self) -> Integers:
         """Kind of each shape; −1 of a joint limit."""
         return np.append(self.system.shapes.kind, np.full(len(self.stops.body), -1))
-
-    @cached_property
-    def radius(self) -> Floats:
-        """Radius of each shape [m]; −1 of a joint limit."""
-        return np.append(self.system.shapes.radius, np.full(len(self.stops.body), -1.0))
 
     @cached_property
     def found(self) -> Contacts:
@@ -229,26 +229,12 @@ class Start:
 
     def handed(self, q: Floats, time: float) -> Floats:
         """Generalized force (d,) of the hand at q and at a time [s]."""
-        force = np.zeros(self.mechanism.nv)
-        wrench = mechanism.wrench_of(self.scene, time)
-        if wrench.any():
-            body = self.mechanism.index(self.hand.body)
-            R, p = self.mechanism.placements(q)
-            point = p[body] + R[body] @ np.array([*self.hand.point, 0.0][:3])
-            force += wrench[:3] @ self.mechanism.point_jacobian(q, body, point)
-            force += wrench[3:] @ self.mechanism.frame_jacobian(q, body)[3:]
-        return force
+        return mechanism.hand_force_of(self.scene, self.mechanism, q, time)
 
     @property
-    def hand(self) -> Hand:
-        """The hand; only a scene that has one asks for it."""
-        return cast(Hand, self.scene.hand)
-
-    @cached_property
     def tool(self) -> slice:
         """Range in v of the tree that the hand holds."""
-        tree = self.mechanism.tree_of_body[self.mechanism.index(self.hand.body)]
-        return slice(*self.mechanism.tree_dofs[tree])
+        return slice(*self.system.tool_dofs)
 
     @cached_property
     def fall(self) -> Floats:
@@ -276,18 +262,13 @@ class Start:
     @cached_property
     def by_pair(self) -> list[Rows]:
         """Contacts of each pair of shapes, closest first: at most 4 in space and 2 in the plane, as
-        on a flat face."""
+        on a flat face; the closest pair first."""
         kept: dict[tuple[int, int], list[int]] = {}
-        for i, pair in enumerate(
-            zip(self.found.shape_a.tolist(), self.found.shape_b.tolist(), strict=True)
-        ):
+        for i in np.argsort(self.found.gap, kind="stable").tolist():
+            pair = int(self.found.shape_a[i]), int(self.found.shape_b[i])
             kept.setdefault(pair, []).append(i)
-        return [
-            np.array(
-                sorted(rows, key=lambda i: float(self.found.gap[i]))[: 4 if self.spatial else 2]
-            )
-            for rows in kept.values()
-        ]
+        most = 4 if self.spatial else 2
+        return [np.array(rows[:most]) for rows in kept.values()]
 
     @cached_property
     def touching(self) -> list[Rows]:
@@ -313,14 +294,13 @@ class Start:
         falls: dict[int, Rows] = {}
         for rows in self.by_pair:
             i = int(rows[0])
-            tree = int(self.tree_a[rows[0]])
+            tree = int(self.tree_a[i])
             # a linkage would change its pose
             free = np.count_nonzero(self.mechanism.tree_of_body == tree) == 1
-            flat = len(rows) > 1 or self.radius[self.found.shape_a[i]] > 0.0  # not on one corner
+            # not on one corner
+            flat = len(rows) > 1 or self.kind[self.found.shape_a[i]] in ROUND
             if tree not in touched and free and flat and self.pull[i] < 0.0:
-                falls[tree] = min(
-                    falls.get(tree, rows), rows, key=lambda rows: float(self.found.gap[rows[0]])
-                )
+                falls.setdefault(tree, rows)
         return [*self.touching, *falls.values()]
 
     @cached_property
@@ -355,20 +335,17 @@ class Start:
             pushing &= force > 0.0  # a contact that would pull carries nothing
         hand = self.scene.hand.largest_force() if self.scene.hand is not None else 0.0
         weights = float(np.linalg.norm(self.gravity)) * sum(body.mass for body in self.scene.bodies)
-        return np.clip(
-            force, 0.0, weights + hand
-        )  # wedges and levers can give more, but less in other poses
+        # wedges and levers can give more, but less in other poses
+        return np.clip(force, 0.0, weights + hand)
 
     def names(self, rows: Iterable[int]) -> str:
         """Return the names of the things in contact, such as "box and floor"; of more than two, the
         first three."""
         shapes = [s for i in rows for s in (int(self.found.shape_a[i]), int(self.found.shape_b[i]))]
         named = list(dict.fromkeys(self.labels[s] for s in shapes))
-        return (
-            " and ".join(named)
-            if len(named) < 3
-            else f"{', '.join(named[:3])}{' …' if len(named) > 3 else ''}"
-        )
+        if len(named) < 3:
+            return " and ".join(named)
+        return ", ".join(named[:3]) + " …" * (len(named) > 3)
 
 
 def step_limits(start: Start) -> StepLimits | None:
@@ -449,56 +426,74 @@ def check_scene(
 def _degrees(scene: Scene) -> Iterator[Caution]:
     """Warn of angles that look like degrees: whole numbers beyond one turn, in joints multiples of
     45."""
-    placed: list[tuple[tuple[str | int, ...], Any]] = []  # path, and what has angles
     for part, things in (("bodies", scene.bodies), ("walls", scene.walls)):
-        for i, one in enumerate(things):
-            shapes = enumerate(getattr(one, "shapes", ()))
-            placed += [((part, i), one), *(((part, i, "shapes", k), shape) for k, shape in shapes)]
-    angles = [
-        ((*path, "angle"), one.angle, 1) for path, one in placed if hasattr(one, "angle")
-    ]  # with its unit
-    angles += [
-        ((*path, "rpy", k), x, 1)
-        for path, one in placed
-        for k, x in enumerate(getattr(one, "rpy", ()))
-    ]
-    for i, body in enumerate(scene.bodies):
-        angles += (
-            [(("bodies", i, "position", 2), body.position[2], 1)] if body.joint == "planar" else []
-        )
-        for field in ("position", "joint_limits") if body.joint == "revolute" else ():
-            angles += [
-                (("bodies", i, field, k), x, MANY_TURNS)
-                for k, x in enumerate(getattr(body, field) or ())
-            ]
-    for path, angle, unit in angles:
-        if abs(angle) > math.tau and angle % unit == 0.0:
-            yield Caution(
-                "degrees",
-                scene.field_name(*path),
-                f"{scene.place_of(*path)}{scene.field_name(*path)} = {angle:g} rad looks "
-                f"like degrees: set {math.radians(angle):.6g}, for angles are in radians",
-            )
+        for i, thing in enumerate(things):
+            for inside, angle, unit in _angles(thing):
+                if abs(angle) > math.tau and angle % unit == 0.0:
+                    yield _about(
+                        scene,
+                        "degrees",
+                        (part, i, *inside),
+                        f" = {angle:g} rad looks like degrees: set {math.radians(angle):.6g}, for "
+                        "angles are in radians",
+                    )
+
+
+def _angles(thing: Any) -> Iterator[tuple[Path, float, int]]:
+    """Yield path, value and unit of each angle of a body, wall or shape."""
+    if hasattr(thing, "angle"):
+        yield ("angle",), thing.angle, 1
+    for k, angle in enumerate(getattr(thing, "rpy", ())):
+        yield ("rpy", k), angle, 1
+    for k, shape in enumerate(getattr(thing, "shapes", ())):
+        for inside, angle, unit in _angles(shape):
+            yield ("shapes", k, *inside), angle, unit
+    joint = getattr(thing, "joint", "")
+    if joint == "planar":
+        yield ("position", 2), thing.position[2], 1
+    for field in ("position", "joint_limits") if joint == "revolute" else ():
+        for k, angle in enumerate(getattr(thing, field) or ()):
+            yield (field, k), angle, MANY_TURNS
+
+
+def _about(scene: Scene, kind: str, path: Path, says: str) -> Caution:
+    """Return a warning about a field, with its place in the file."""
+    name = scene.field_name(*path)
+    return Caution(kind, name, f"{scene.place_of(*path)}{name}{says}")
 
 
 def _inertias(scene: Scene) -> Iterator[Caution]:
     """Warn of moments of inertia that no body has: the largest one exceeds the sum of the others by
-    a thousandth."""
-    for i, body in enumerate(scene.bodies if isinstance(scene, SpatialScene) else ()):
-        low, middle, high = np.linalg.eigvalsh(inertia_matrix(body.inertia)).tolist()
-        if high > 1.001 * (low + middle):
-            path = ("bodies", i, "inertia")
-            yield Caution(
-                "inertia",
-                scene.field_name(*path),
-                f"{scene.place_of(*path)}{scene.field_name(*path)}: no body has a moment of "
-                f"{high:.3g} kg m2 beside {low:.3g} and {middle:.3g}; it is at most their sum",
-            )
+    a thousandth; and of those of a free body that its shapes do not have with its mass."""
+    for i, body in enumerate(scene.bodies):
+        path = ("bodies", i, "inertia")
+        given = np.atleast_2d(body.inertia)
+        if isinstance(scene, SpatialScene):
+            given = inertia_matrix(body.inertia)
+            low, middle, high = np.linalg.eigvalsh(given).tolist()
+            if high > 1.001 * (low + middle):
+                yield _about(
+                    scene,
+                    "inertia",
+                    path,
+                    f": no body has a moment of {high:.3g} kg m2 beside {low:.3g} and "
+                    f"{middle:.3g}; it is at most their sum",
+                )
+        if body.joint in ("planar", "free_flyer") and body.parent == WORLD and body.shapes:
+            filled = filled_with(body.shapes, 1.0)
+            usual = body.mass / filled["mass"] * np.trace(np.atleast_2d(filled["inertia"]))
+            times = float(np.trace(given) / usual)
+            if not 1.0 / STRANGE < times < STRANGE:
+                yield _about(
+                    scene,
+                    "inertia",
+                    path,
+                    f" is {times:.2g} times that of its shapes with its mass: is the unit kg m2?",
+                )
 
 
 def _overlaps(start: Start) -> Iterator[Caution]:
-    """Warn of shapes that start inside each other, behind a wall, or in a gap narrower than the
-    shape."""
+    """Warn of shapes that start inside each other, or in a gap narrower than the shape."""
     found = start.found
     sides = dict[int, list[int]]()
     resting = np.zeros(len(start.rows))
@@ -507,45 +502,28 @@ def _overlaps(start: Start) -> Iterator[Caution]:
     for rows in start.by_pair:
         i = int(rows[0])
         depth = -float(found.gap[i])
-        a, b = (start.labels[s] for s in (found.shape_a[i], found.shape_b[i]))
         if depth <= 0.0 or not _too_deep(start, rows, float(resting[rows].max())):
             continue
         if found.body_b[i] < 0:
             sides.setdefault(int(found.body_a[i]), []).append(i)
-        kind = "overlap"
-        says = f"{a} starts {in_metres(depth)} inside {b}, and "
+        a, b = (start.labels[s] for s in (found.shape_a[i], found.shape_b[i]))
         out = ", ".join(f"{depth * x:.3g}" for x in found.normal[i][: 3 if start.spatial else 2])
-        remedy = f": move it by [{out}] m"
-        if start.kind[found.shape_b[i]] in geometry.ENDLESS and depth >= start.thickness[i]:
-            kind = "outside"
-            says = f"{a} starts behind {b}, {in_metres(depth)} deep"
-        elif (
-            float(start.rows[i] @ start.moved(start.rows[i][None])[:, 0])
-            <= 1e-12 * start.critical[0][0]
-        ):
-            says = f"{says}no joint can move it out"
-            remedy = f"{remedy}, or take the shape or the wall away"
-        else:
-            K, _ = start.scene.contact.gains
-            stored = 0.5 * K * float(np.sum(np.minimum(found.gap[rows], 0.0) ** 2))
-            thrown = f"{stored:.3g} J in the contact's spring throw it out"
-            says += thrown if start.scene.contact.forces == "paper" else "the contact pushes it out"
-        yield Caution(kind, f"{a} and {b}", f"{says}{remedy}")
+        says = f"{a} starts {in_metres(depth)} inside {b}: move it by [{out}] m"
+        if start.mobility(start.rows[i : i + 1]) <= 1e-12 * start.critical[0][0]:
+            says += ", or take the shape or the wall away, for no joint can move it out"
+        yield Caution("overlap", f"{a} and {b}", says)
     for rows_of_body in sides.values():
-        for n, i in enumerate(rows_of_body):
-            for j in [
-                j for j in rows_of_body[:n] if float(found.normal[i] @ found.normal[j]) < -0.5
-            ][:1]:
+        for i, j in itertools.combinations(rows_of_body, 2):
+            if found.normal[i] @ found.normal[j] < -0.5:
                 a, b, c = (
-                    start.labels[s] for s in (found.shape_a[i], found.shape_b[j], found.shape_b[i])
+                    start.labels[s] for s in (found.shape_a[i], found.shape_b[i], found.shape_b[j])
                 )
+                narrower = in_metres(-float(found.gap[i] + found.gap[j]))
                 yield Caution(
                     "wedged",
                     f"{a}, {b}, {c}",
-                    f"{a} stands in a gap between {b} and {c} that is "
-                    f"{in_metres(-float(found.gap[i] + found.gap[j]))} narrower than it: widen "
-                    f"the gap, or "
-                    f"make {a} smaller",
+                    f"{a} stands in a gap between {b} and {c} that is {narrower} narrower than it: "
+                    f"widen the gap, or make {a} smaller",
                 )
 
 
@@ -621,25 +599,27 @@ def _sags(start: Start) -> Iterator[Caution]:
     """Warn of static loads that sag by more than a tenth: of a shape at a contact, of the range at
     a joint limit."""
     K, _ = start.scene.contact.gains
+    if K == 0.0:
+        return
     stops = start.stops
     found = [(0.0, -1)]
-    for rows in start.supports if K > 0.0 else ():
+    for rows in start.supports:
         shares = start.loads(rows) / (K * start.thickness[rows])
         found.append((float(shares.max()), int(rows[shares.argmax()])))
     touching = {int(i) for rows in start.touching for i in rows}
-    for k, i in enumerate(range(start.first_stop, len(start.rows)) if K > 0.0 else ()):
-        there = start.q.copy()
-        there[stops.coordinate[k]] = stops.bound[
-            k
-        ]  # the joint is at its limit, and those behind it are fixed
-        load = -float(stops.sign[k] * start.applied(there)[stops.dof[k]] / stops.arm[k])
-        found += [(load / (K * float(start.thickness[i])), i)] if i not in touching else []
+    for k, i in enumerate(range(start.first_stop, len(start.rows))):
+        if i not in touching:
+            # the joint is at its limit, and those behind it are fixed
+            there = start.q.copy()
+            there[stops.coordinate[k]] = stops.bound[k]
+            load = -float(stops.sign[k] * start.applied(there)[stops.dof[k]] / stops.arm[k])
+            found.append((load / (K * float(start.thickness[i])), i))
     share, i = max(found)
     if share <= SAG:
         return
     both = start.names([i])
     says = f"{both} overlap by {in_metres(share * start.thickness[i])}, {share:.0%} of the thinner"
-    if start.found.shape_a[i] == start.found.shape_b[i]:
+    if i >= start.first_stop:
         says = f"the load on {both} holds its joint beyond it by {share:.3g} times its range"
     yield Caution("sag", both, f"at rest {says}: set contact.stiffness >= {_up(K * share / SAG):g}")
 
@@ -650,13 +630,13 @@ def _overdriven_friction(start: Start) -> Iterator[Caution]:
     worst = 2.0
     where = ""
     for rows in start.supports:
-        root = np.sqrt(
-            start.friction[rows] * start.loads(rows) * start.dt / contact.friction_velocity
-        )
-        tangents = [
-            r * row for i, r in zip(rows, root, strict=True) if r > 0.0 for row in start.slips(i)
+        loads = start.friction[rows] * start.loads(rows) * start.dt / contact.friction_velocity
+        slips = [
+            math.sqrt(load) * row
+            for i, load in zip(rows.tolist(), loads.tolist(), strict=True)
+            for row in start.slips(i)
         ]
-        found = start.mobility(np.array(tangents))
+        found = start.mobility(np.array(slips))
         if found > worst * (1.0 + ROUNDED):
             worst = found
             where = start.names(rows)
@@ -683,11 +663,10 @@ def _coupled(start: Start, coupling: str) -> Iterator[Caution]:
         return
     device = start.scene.device
     loop = next(iter(loops.values()))
-    times = start.hand.times(start.scene.duration)
+    times = cast(Hand, start.scene.hand).times(start.scene.duration)
     inverse = np.linalg.inv(loop.mass)
-    hand = max(
-        force @ inverse @ force for force in (start.handed(start.q, t)[start.tool] for t in times)
-    )
+    pushes = [start.handed(start.q, time)[start.tool] for time in times]
+    hand = max(push @ inverse @ push for push in pushes)
     if device is None or device.position_resolution is None or hand == 0.0:
         return
     kick = np.array(device.position_resolution) * (loop.stiffness * loop.dt + loop.damping)
@@ -714,40 +693,35 @@ def _growing(start: Start, coupling: str, loops: dict[str, HapticLoop], where: s
     def holds(factors: dict[str, Any]) -> bool:
         return hold(scaled(each, factors) for each in every)
 
+    # a coordinate without whose gains the loop holds
     alone = [i for i in range(len(one)) if holds(dict.fromkeys(MARGIN, 1.0 - one[i]))]
     blamed = one[alone[0]] if alone else np.ones(len(one))
+    swinging = names[alone[0]] if alone else "tool and device"
     less = [1.0 - (1.0 - x) * blamed for x in FEWER]
-    tried = [
-        dict.fromkeys(fields, factor)
-        for fields in (("damping",), ("stiffness",), ("stiffness", "damping"))
-        if (factor := nearest(_scaling(holds, fields), less)) is not None
-    ]
     path = f"couplings.{coupling.replace('-', '_')}"
-    remedies = [
-        " and ".join(
-            f"{path}.{name} <= {_listed(_down(x) for x in getattr(loop, name) * factor)}"
-            for name, factor in factors.items()
-        )
-        for factors in tried[:1]
-    ]
+    remedies = []
+    for fields in (("damping",), ("stiffness",), ("stiffness", "damping")):
+        tried = [dict.fromkeys(fields, factor) for factor in less]
+        factors = nearest(holds, tried)
+        if factors is not None:
+            limits = {name: getattr(loop, name) * factors[name] for name in fields}
+            said = [f"{path}.{name} <= {_listed(map(_down, x))}" for name, x in limits.items()]
+            remedies.append(" and ".join(said))
+            break
     shorter = range(loop.delay - 1, -1, -1)
     delay = nearest(lambda n: hold(replace(each, delay=n) for each in every), shorter)
-    remedies += [f"device.delay <= {delay}"] if delay is not None else []
+    if delay is not None:
+        remedies.append(f"device.delay <= {delay}")
     steps = [x for x in FEWER if rate / x <= MAX_RATE]
     step = nearest(lambda x: holds({"dt": x}), steps)
-    remedies += [f"rate >= {_up(rate / step):g} Hz"] if step is not None else []
+    if step is not None:
+        remedies.append(f"rate >= {_up(rate / step):g} Hz")
     return Caution(
         "coupling",
         f"{coupling} coupling",
-        f"the {coupling} coupling makes {names[alone[0]] if alone else 'tool and device'} swing "
-        f"ever more, {where}{_limit(loop)}: set {', or '.join(remedies) or 'smaller gains'}",
+        f"the {coupling} coupling makes {swinging} swing ever more, {where}{_limit(loop)}: set "
+        f"{', or '.join(remedies) or 'smaller gains'}",
     )
-
-
-def _scaling(holds: Callable[[dict[str, Any]], bool], fields: tuple[str, ...]) -> Any:
-    """Return the function that says whether loops hold with some fields multiplied by one
-    factor."""
-    return lambda factor: holds(dict.fromkeys(fields, factor))
 
 
 def _limit(loop: HapticLoop) -> str:
@@ -770,12 +744,11 @@ def _loops(start: Start, coupling: str) -> dict[str, HapticLoop]:
     gains: Gains = getattr(scene.couplings, coupling.replace("-", "_"))
     device: Any = scene.device
     mass = start.mechanism.mass_matrix(start.q)[tool, tool]
-    damping = device.damping if device is not None else None
     free = HapticLoop(
         mass,
         np.array(gains.stiffness),
         np.array(gains.damping),
-        device_damping=np.array(damping or np.zeros(len(mass))),
+        device_damping=np.array((device and device.damping) or np.zeros(len(mass))),
         joint_damping=mechanism.joint_damping_of(scene)[tool],
         delay=device.delay if device is not None else 0,
         dt=start.dt,
@@ -793,7 +766,7 @@ def _loops(start: Start, coupling: str) -> dict[str, HapticLoop]:
     if not free.reflects:  # it acts in contact, and a little before
         loops = {"before the tool touches": replace(free, within=SOON)}
     touched = [rows for rows in start.by_pair if start.rows[rows][:, tool].any()]
-    for rows in sorted(touched, key=lambda rows: float(start.found.gap[rows[0]]))[:NEAREST]:
+    for rows in touched[:NEAREST]:
         J = start.rows[rows][:, tool]
         wall = replace(free, spring=K * J.T @ J, damper=B * J.T @ J)
         if not scaled(wall, dict.fromkeys(MARGIN, 0.0)).grows:  # else the contact is to blame

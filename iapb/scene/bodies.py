@@ -306,7 +306,7 @@ class AnyBody(ScenePart):
             "density": Positive,
         }
         try:
-            inertial = _filled_with(
+            inertial = filled_with(
                 *(TypeAdapter(kind).validate_python(given[name]) for name, kind in kinds.items())
             )
         except (
@@ -459,7 +459,7 @@ def inertia_matrix(inertia: Any) -> NDArray[np.float64]:
 
 
 @np.errstate(divide="raise", invalid="raise")
-def _filled_with(shapes: Sequence[Any], density: float) -> dict[str, Any]:
+def filled_with(shapes: Sequence[Any], density: float) -> dict[str, Any]:
     """Return `mass`, `center_of_mass` and `inertia` of shapes of one density, without BLAS;
     overlaps count twice."""
     parts = [_mass_of(shape, density) for shape in shapes]

@@ -131,6 +131,22 @@ def wrench_of(scene: Scene, time: float) -> Floats:
     return wrench
 
 
+def hand_force_of(scene: Scene, mechanism: Mechanism, q: Floats, time: float) -> Floats:
+    """Return the generalized force (d,) of the scene's hand at a configuration and a time [s]."""
+    wrench = wrench_of(scene, time)
+    if scene.hand is None or not wrench.any():
+        return np.zeros(mechanism.nv)
+    body = mechanism.index(scene.hand.body)
+    lever = mechanism.placements(q)[0][body] @ np.array([*scene.hand.point, 0.0])[:3]
+    wrench[3:] += np.cross(lever, wrench[:3])
+    return mechanism.frame_jacobian(q, body).T @ wrench
+
+
+def gravity_of(scene: Scene) -> Floats:
+    """Return the acceleration (3,) by gravity [m/s²]."""
+    return np.array([*(scene.gravity or ()), 0.0, 0.0, 0.0])[:3]
+
+
 def joint_damping_of(scene: Scene) -> Floats:
     """Return the viscous damping (nv,) of each velocity [N s/m, N m s/rad]."""
     return _by_velocity(scene, "joint_damping", 2)
