@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from iapb.contact.impact import resolve_impact as resolve_impact
     from iapb.contact.impact import resolve_impacts as resolve_impacts
     from iapb.effects import Effect as Effect
-    from iapb.effects import decide_effects as decide_effects
     from iapb.errors import ArgumentError as ArgumentError
     from iapb.errors import IapbError as IapbError
     from iapb.errors import MissingDependencyError as MissingDependencyError
@@ -34,6 +33,7 @@ if TYPE_CHECKING:
     from iapb.scene import scene_folder as scene_folder
     from iapb.simulation import Simulation as Simulation
     from iapb.simulation import simulate as simulate
+    from iapb.system import decide_effects as decide_effects
     from verification import check_passivity as check_passivity
     from verification.certificate import Certificate as Certificate
     from verification.certificate import certify as certify
@@ -51,7 +51,7 @@ _HOME = {
         "resolve_impact",
         "resolve_impacts",
     ),
-    "iapb.effects": ("Effect", "decide_effects"),
+    "iapb.effects": ("Effect",),
     "iapb.errors": (
         "ArgumentError",
         "IapbError",
@@ -65,6 +65,7 @@ _HOME = {
     "iapb.run": ("Run",),
     "iapb.scene": ("Scene", "find_scene", "load_scene", "scene_folder"),
     "iapb.simulation": ("Simulation", "simulate"),
+    "iapb.system": ("decide_effects",),
     # upper packages bring these as entry points: the engine never imports one
     "": (
         "BareDevice",

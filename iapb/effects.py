@@ -8,6 +8,7 @@ row.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,19 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from iapb.contact import laws
-from iapb.contact.geometry import Shapes, contact_capacity
-from iapb.haptics.coupling import Coupling
-from iapb.mechanics.mechanism import Mechanism
-from iapb.numerics.schema import Indices
 from iapb.scene import Scene
-from iapb.scene.mechanism import (
-    frictions_of,
-    mechanism_of,
-    pairs_of,
-    restitutions_of,
-    shapes_of,
-    stops_of,
-)
 from iapb.scene.model import Device
 
 COUPLING_FIELDS = {"four-channel": "four_channel", "unilateral": "unilateral"}
@@ -57,19 +46,32 @@ class Question:
     """A scene and the caller's law, coupling and rendering. None means not chosen yet: only the
     scene decides."""
 
-    scene: Scene
-    mechanism: Mechanism
-    wall_pairs: int  # candidate pairs of a moving shape and a static one
-    body_pairs: int  # candidate pairs of shapes of two trees
-    tree_pairs: int  # candidate pairs of shapes of one tree
-    most_contacts: int  # for which there is room
-    restitutions: list[float]  # different values of e among the pairs, ascending
-    frictions: list[float]  # different values of mu among the pairs, ascending
+    system: Any  # the scene's `iapb.system.System`
     law: str | None
     uses: frozenset[str]  # parts of the contact section that the law uses
     coupling: str | None
     own_gains: Any  # of a coupling object of the caller; None: the scene's gains
     rendering: str | None
+
+    @property
+    def scene(self) -> Scene:
+        """The scene."""
+        found: Scene = self.system.scene
+        return found
+
+    @cached_property
+    def pairs(self) -> Counter[str]:
+        """Number of candidate pairs of a moving shape with: walls, or anything static; shapes of
+        other trees; links, shapes of its own tree."""
+        body_a, body_b = self.system.shapes.body[self.system.pairs.T]
+        tree = self.system.mechanism.tree_of_body
+        moving = np.where(tree[body_a] == tree[body_b], "links", "others")
+        return Counter(np.where(body_b < 0, "walls", moving).tolist())
+
+    @cached_property
+    def frictions(self) -> list[float]:
+        """Different values of mu among the pairs, ascending."""
+        return sorted(set(self.system.frictions.by_pair(self.system.pairs).tolist()))
 
     @cached_property
     def device(self) -> Device:
@@ -80,7 +82,7 @@ class Question:
     def sinking(self) -> list[str]:
         """Names of bodies whose generalized gravity force is not exactly zero at all of some random
         poses."""
-        mechanism = self.mechanism
+        mechanism = self.system.mechanism
         field = self.scene.gravity or ()
         chance = np.random.default_rng(0)
         q = np.array([x for body in self.scene.bodies for x in body.position], np.float64)
@@ -109,11 +111,8 @@ class Question:
     def no_contact(self) -> str:
         """Return why nothing can touch; empty if shapes, or joints with limits that the law keeps,
         can."""
-        stops = laws.JOINTS in self.uses and any(
-            body.joint_limits is not None for body in self.scene.bodies
-        )
-        pairs = self.wall_pairs or self.body_pairs or self.tree_pairs
-        return "" if pairs or stops else "nothing can touch: the scene has no pair of shapes"
+        stops = laws.JOINTS in self.uses and len(self.system.stops.bound)
+        return "" if self.pairs or stops else "nothing can touch: the scene has no pair of shapes"
 
     def no_device(self) -> str:
         """Return why no device takes part; empty if one does."""
@@ -121,12 +120,10 @@ class Question:
             return "the scene has no hand"
         if self.coupling == "none":
             return "no coupling was chosen: the hand holds the tool itself"
-        wanted = COUPLING_FIELDS.get(self.coupling or "", "")
-        return (
-            ""
-            if self.gains is not None
-            else f"the scene gives no gains under couplings{'.' * bool(wanted)}{wanted}"
-        )
+        if self.gains is not None:
+            return ""
+        field = COUPLING_FIELDS.get(self.coupling or "")
+        return f"the scene gives no gains under couplings{f'.{field}' if field else ''}"
 
 
 Reason = Callable[[Question], str]
@@ -146,13 +143,13 @@ class Rule(NamedTuple):
 
     def decide(self, name: str, q: Question) -> Effect:
         """Return the effect for a question."""
-        absent = self.absent(q) if self.absent else q.no_contact() if self.parts else ""
+        absent = q.no_contact() if self.parts else ""
+        if self.absent is not None:
+            absent = self.absent(q)
         off = absent or self.off(q)
-        unused = (
-            f"the law '{q.law}' does not use it"
-            if self.parts and self.parts[0] not in q.uses
-            else ""
-        )
+        unused = ""
+        if self.parts and self.parts[0] not in q.uses:
+            unused = f"the law '{q.law}' does not use it"
         ignored = unused and not off and q.uses.isdisjoint(self.parts)
         left_out = self.left_out if isinstance(self.left_out, str) else self.left_out(q)
         why = absent or unused or off
@@ -174,12 +171,9 @@ def _weightless(q: Question) -> str:
         return ""
     if not any(q.scene.gravity or ()):
         return "the scene gives no gravity"
-    massless = not any(body.mass > 0.0 for body in q.scene.bodies)
-    return (
-        "no body has mass"
-        if massless
-        else f"nothing moves along gravity = {numbers(q.scene.gravity)} m/s2"
-    )
+    if not any(body.mass > 0.0 for body in q.scene.bodies):
+        return "no body has mass"
+    return f"nothing moves along gravity = {numbers(q.scene.gravity)} m/s2"
 
 
 def _push(q: Question) -> str:
@@ -193,7 +187,7 @@ def _push(q: Question) -> str:
         units = "N, N, N m" if len(hand.force) == 3 else "N, N, N, N m, N m, N m"
         return f"the hand pushes {hand.body} with {said[0]} {units}"
     if rows := hand.force_table:
-        count = f"{len(rows)} row{'s' * (len(rows) > 1)}"
+        count = "1 row" if len(rows) == 1 else f"{len(rows)} rows"
         said.append(f"hand.force_table, {count} from {rows[0][0]:g} to {rows[-1][0]:g} s")
     if hand.force_function:
         said.append(f"hand.force_function = [{', '.join(hand.force_function)}]")
@@ -204,16 +198,16 @@ def _joints(what: str, unit: str, left_out: str, part: str = laws.JOINTS) -> Rul
     """Return the rule of an effect that joints ask for by a field."""
     field = f"joint_{what}"
 
-    def given(q: Question) -> list[str]:
-        values = ((body.name, getattr(body, field)) for body in q.scene.bodies)
-        return [
-            f"{name} {numbers(x)}"
-            for name, x in values
-            if x is not None and (what == "limits" or any(x))
+    def given(q: Question) -> str:
+        """The first three joints that have it, with its numbers."""
+        values = [(body.name, getattr(body, field)) for body in q.scene.bodies]
+        found = [
+            f"{name} {numbers(x)}" for name, x in values if any(x or ()) or what == "limits" and x
         ]
+        return ", ".join(found[:3]) + " …" * (len(found) > 3)
 
     return Rule(
-        lambda q: f"{field}: {', '.join(given(q)[:3])}{' …' if len(given(q)) > 3 else ''} {unit}",
+        lambda q: f"{field}: {given(q)} {unit}",
         left_out,
         parts=(part,),
         absent=lambda q: "" if given(q) else f"no joint has {what}",
@@ -221,17 +215,53 @@ def _joints(what: str, unit: str, left_out: str, part: str = laws.JOINTS) -> Rul
     )
 
 
+_OF_PAIRS = {
+    "restitution": "the smaller that body or wall of a pair gives",
+    "friction": "by pair: of two values the geometric mean",
+}
+
+
 def _by_pair(q: Question, field: str) -> str:
     """Return text with restitution or friction of the pairs that can touch."""
-    values = q.restitutions if field == "restitution" else q.frictions
+    values = q.frictions if field == "friction" else q.system.restitutions
     if len(values) > 1:
-        how = {
-            "restitution": "the smaller that body or wall of a pair gives",
-            "friction": "by pair: of two values the geometric mean",
-        }[field]
-        return f"{field} {values[0]:g} to {values[-1]:g}, {how}"
-    own = values[0] != getattr(q.scene.contact, field)
-    return f"{f'all pairs have {field}' if own else f'contact.{field} ='} {values[0]:g}"
+        return f"{field} {values[0]:g} to {values[-1]:g}, {_OF_PAIRS[field]}"
+    if values[0] != getattr(q.scene.contact, field):
+        return f"all pairs have {field} {values[0]:g}"
+    return f"contact.{field} = {values[0]:g}"
+
+
+def _no_impulse(q: Question) -> str:
+    """Return why an impulse would be zero; empty if it would not."""
+    if q.system.restitutions[-1] > -1.0:
+        return ""
+    return f"{_by_pair(q, 'restitution')}: an impulse would be zero"
+
+
+def _at_first_overlap(q: Question) -> str:
+    """Return why impacts wait for an overlap; empty if they happen at the touch."""
+    if q.scene.contact.forces == "paper":
+        return "contact.forces = paper"
+    return _no_impulse(q) if q.scene.contact.at_touch else "contact.impact_time = step"
+
+
+def _no_slip(q: Question) -> str:
+    """Return why impacts have no friction; empty if they have."""
+    if q.scene.contact.self_collision_rows == "per_body" and not _smooth(q):
+        return "contact.self_collision_rows = per_body: rows of one body alone have no slip"
+    return _smooth(q)
+
+
+def _explicit(q: Question) -> str:
+    """Return that contact forces are explicit; empty if they are implicit."""
+    return "contact.forces = paper" if q.scene.contact.forces == "paper" else ""
+
+
+def _unlimited(q: Question) -> str:
+    """Return why the device's limits have no effect; empty if they have."""
+    if q.device.force_limit is None:
+        return "the scene gives no device.force_limit"
+    return "the rendering 'full' ignores the limits" if q.rendering == "full" else ""
 
 
 def _smooth(q: Question) -> str:
@@ -288,7 +318,7 @@ EFFECTS: dict[str, Rule] = {
         "links would keep the inertia of their first pose",
         lambda q: (
             "the mass matrix is constant: it is factored once, before the first step"
-            if q.mechanism.has_constant_mass_matrix
+            if q.system.mechanism.has_constant_mass_matrix
             else ""
         ),
     ),
@@ -297,7 +327,7 @@ EFFECTS: dict[str, Rule] = {
         "swinging links would gain or lose energy in free motion",
         lambda q: (
             ""
-            if q.mechanism.has_velocity_terms
+            if q.system.mechanism.has_velocity_terms
             else "no joint feels the velocity of another: B(q, v) is zero for every motion"
         ),
     ),
@@ -321,25 +351,25 @@ EFFECTS: dict[str, Rule] = {
     "joint_limits": _joints("limits", "rad, m", "joints would turn and slide without end"),
     # what can touch
     "wall_contacts": Rule(
-        lambda q: f"{_count(q.wall_pairs)} of a moving shape and a static one can touch",
+        lambda q: f"{_count(q.pairs['walls'])} of a moving shape and a static one can touch",
         "bodies would pass through walls",
-        lambda q: "" if q.wall_pairs else "no moving shape has a static one to touch",
+        lambda q: "" if q.pairs["walls"] else "no moving shape has a static one to touch",
     ),
     "body_contacts": Rule(
-        lambda q: f"{_count(q.body_pairs)} of shapes of separate bodies can touch",
+        lambda q: f"{_count(q.pairs['others'])} of shapes of separate bodies can touch",
         "moving bodies would pass through each other",
-        lambda q: "" if q.body_pairs else "no two separate moving bodies have shapes",
+        lambda q: "" if q.pairs["others"] else "no two separate moving bodies have shapes",
     ),
     "self_collisions": Rule(
         lambda q: (
-            f"contact.self_collisions = true, and {_count(q.tree_pairs)} of links that are not "
+            f"contact.self_collisions = true, and {_count(q.pairs['links'])} of links that are not "
             f"neighbours "
             "can touch"
         ),
         "links of one tree would pass through each other",
         lambda q: (
             ""
-            if q.tree_pairs
+            if q.pairs["links"]
             else "contact.self_collisions = true, but no two links with shapes are more than one joint apart"
         ),
         absent=lambda q: (
@@ -352,11 +382,7 @@ EFFECTS: dict[str, Rule] = {
     "impulses": Rule(
         lambda q: f"new contacts collide: {_by_pair(q, 'restitution')}",
         "bodies would be stopped by springs alone and sink in further",
-        lambda q: (
-            f"{_by_pair(q, 'restitution')}: an impulse would be zero"
-            if q.restitutions[-1] == -1.0
-            else ""
-        ),
+        _no_impulse,
         (laws.IMPULSES, laws.OWN_RESTITUTION),
         ignores="restitution",
     ),
@@ -365,7 +391,7 @@ EFFECTS: dict[str, Rule] = {
         "all contacts of an impact would bounce alike",
         lambda q: (
             ""
-            if len(q.restitutions) > 1
+            if len(q.system.restitutions) > 1
             else f"all contacts are alike: {_by_pair(q, 'restitution')}"
         ),
         (laws.OWN_RESTITUTION,),
@@ -373,14 +399,7 @@ EFFECTS: dict[str, Rule] = {
     "impact_friction": Rule(
         lambda q: _by_pair(q, "friction"),
         "bodies would bounce without losing tangential speed",
-        lambda q: (
-            _smooth(q)
-            or (
-                "contact.self_collision_rows = per_body: rows of one body alone have no slip"
-                if q.scene.contact.self_collision_rows == "per_body"
-                else ""
-            )
-        ),
+        _no_slip,
         (laws.IMPACT_FRICTION,),
     ),
     # resting contacts: K and B of (5), friction by Coulomb's law or by (6)
@@ -411,27 +430,21 @@ EFFECTS: dict[str, Rule] = {
     "implicit_contact": Rule(
         lambda q: "contact.forces = implicit: springs and friction act at the end of each step",
         "stiff springs would need shorter steps",
-        lambda q: "" if q.scene.contact.forces == "implicit" else "contact.forces = paper",
+        _explicit,
     ),
     "touch": Rule(
         lambda q: "contact.impact_time = touch: a step is cut where new contacts meet",
         "impacts would happen at the first step that finds an overlap, with its lever arms",
-        lambda q: (
-            "contact.forces = paper"
-            if q.scene.contact.forces == "paper"
-            else "contact.impact_time = step"
-            if not q.scene.contact.at_touch
-            else f"{_by_pair(q, 'restitution')}: an impulse would be zero"
-            if q.restitutions[-1] == -1.0
-            else ""
-        ),
+        _at_first_overlap,
         (laws.TOUCH,),
     ),
     "supports": Rule(
-        lambda q: f"up to {q.most_contacts} contacts: those that carry a load take part in impacts",
+        lambda q: (
+            f"up to {q.system.most_contacts} contacts: those that carry a load take part in impacts"
+        ),
         "a body that is struck from above would sink into what carries it",
-        lambda q: "" if q.scene.contact.forces == "implicit" else "contact.forces = paper",
-        absent=lambda q: "" if q.most_contacts > 1 else "there is at most one contact",
+        _explicit,
+        absent=lambda q: "" if q.system.most_contacts > 1 else "there is at most one contact",
     ),
     # section III: contacts close together count as one; a contact near one of the step before is
     # not new
@@ -462,13 +475,7 @@ EFFECTS: dict[str, Rule] = {
             + (f", rendering '{q.rendering}'" if q.rendering else "")
         ),
         "the hand would feel impulses that no motor can give",
-        lambda q: (
-            "the scene gives no device.force_limit"
-            if q.device.force_limit is None
-            else "the rendering 'full' ignores the limits"
-            if q.rendering == "full"
-            else ""
-        ),
+        _unlimited,
         absent=lambda q: "" if q.rendering in ("scale", "spread") else q.no_device(),
     ),  # they scale the tool's impulse
     "delay": Rule(
@@ -492,79 +499,24 @@ EFFECTS: dict[str, Rule] = {
 EFFECT_NAMES = tuple(EFFECTS)
 
 
-def decide_effects(
-    scene: Scene,
-    law: laws.ContactLaw | str | None = None,
-    coupling: Coupling | str | None = None,
-    rendering: str | None = None,
+def decide(
+    system: Any, law: Any = None, coupling: Any = None, rendering: str | None = None
 ) -> tuple[Effect, ...]:
-    """Decide which effects are on for a scene and for the caller's choices.
-
-    Parameters
-    ----------
-    scene
-        a checked scene.
-    law, coupling
-        the objects, or their names in a run file, such as "penalty" and "four-channel". With None,
-        an effect is on if some law or coupling needs it. The attribute ``uses`` of a law names the
-        parts of the contact section that it uses (`iapb.contact.laws`); a law without it is assumed
-        to use all of them.
-    rendering
-        such as "scale"; default: the rendering of the law.
-
-    Returns
-    -------
-    tuple of Effect
-        all effects in a fixed order, each with its state, the reason, and what would change without
-        it.
-    """
-    shapes = shapes_of(scene)
-    return decide_for(
-        scene, mechanism_of(scene), shapes, pairs_of(scene, shapes), law, coupling, rendering
-    )
-
-
-def decide_for(
-    scene: Scene,
-    mechanism: Mechanism,
-    shapes: Shapes,
-    pairs: Indices,
-    law: laws.ContactLaw | str | None,
-    coupling: Coupling | str | None,
-    rendering: str | None = None,
-) -> tuple[Effect, ...]:
-    """Do what `decide_effects` does for a scene with its shapes and candidate pairs (k, 2)."""
-    body_a, body_b = shapes.body[pairs.T]
-    wall = body_b < 0
-    same = mechanism.tree_of_body[body_a] == mechanism.tree_of_body[body_b]
-    to_walls, between, within = (int(each.sum()) for each in (wall, ~wall & ~same, ~wall & same))
-    restitutions = restitutions_of(scene, pairs)
-    frictions = sorted(set(frictions_of(scene).by_pair(pairs).tolist()))
-    if law is not None and not isinstance(law, str):
-        law = law.within(scene) if hasattr(law, "within") else law
-        rendering = getattr(law, "rendering", "full") if rendering is None else rendering
+    """Decide which effects are on for a scene's system (see `iapb.system.decide_effects`)."""
     known = laws.ENGINE_LAWS.get(law) if isinstance(law, str) else law
-    uses = (
-        laws.EVERYTHING | {laws.JOINTS, laws.JOINT_FRICTION, laws.TOUCH}
-        if known is None
-        else getattr(known, "uses", laws.EVERYTHING)
-    )
-    names = (one if one is None or isinstance(one, str) else one.name for one in (law, coupling))
-    q = Question(
-        scene,
-        mechanism,
-        to_walls,
-        between,
-        within,
-        contact_capacity(shapes, pairs) + len(stops_of(scene, mechanism).bound),
-        restitutions.tolist(),
-        frictions,
-        next(names),
-        uses,
-        next(names),
-        coupling if hasattr(coupling, "stiffness") else None,
-        rendering,
-    )
+    if known is not law:
+        name = law
+    elif law is None:
+        name = None
+    else:
+        known = law.within(system.scene) if hasattr(law, "within") else law
+        name = known.name
+        rendering = getattr(known, "rendering", "full") if rendering is None else rendering
+    uses = getattr(known, "uses", laws.EVERYTHING)
+    if known is None:
+        uses = laws.EVERYTHING | {laws.JOINTS, laws.JOINT_FRICTION, laws.TOUCH}
+    own_gains = coupling if hasattr(coupling, "stiffness") else None
+    q = Question(system, name, uses, getattr(coupling, "name", coupling), own_gains, rendering)
     return tuple(rule.decide(name, q) for name, rule in EFFECTS.items())
 
 

@@ -18,9 +18,9 @@ from iapb.contact.kernels.implicit import RestWork
 from iapb.contact.kernels.touch import MOST
 from iapb.contact.kernels.unilateral import PushWork, ShareWork
 from iapb.contact.kernels.world import Cut, State, Sweep, Switches, World
-from iapb.contact.laws import ImpulseAugmented
+from iapb.contact.laws import ContactLaw, ImpulseAugmented
 from iapb.contact.solids import Solid, solids_of
-from iapb.effects import EFFECT_NAMES, Effect, active_names, decide_for
+from iapb.effects import EFFECT_NAMES, Effect, active_names, decide
 from iapb.errors import ArgumentError
 from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling, UnilateralCoupler
 from iapb.haptics.rendering import PLANNED, Port
@@ -53,7 +53,8 @@ class System:
     ----------
     remarks : sentences on links that overlap at the start
     mechanism : Mechanism
-    shapes, pairs : Shapes and their candidate pairs (k, 2); capacity : largest number of contacts
+    shapes, pairs : Shapes and their candidate pairs (k, 2); most_contacts : largest number of contacts
+    capacity : contacts for which a step needs room
     tool_tree : int, index of the tree that the hand holds; −1 without a hand
     tool_dofs, tool_coordinates : (start, stop) of the tool in v and in q
     dt : float [s]; tangents : of a contact, 1 in the plane, 2 in space
@@ -69,9 +70,9 @@ class System:
         self.shapes = scene_parts.shapes_of(scene)
         self.pairs, self.remarks = scene_parts.pairs_and_remarks(scene, self.shapes)
         self.stops = scene_parts.stops_of(scene, self.mechanism)
-        self.capacity = contact_capacity(self.shapes, self.pairs) + len(self.stops.bound)
-        if scene.contact.at_touch:  # a step also keeps those that have struck and are apart
-            self.capacity *= 2
+        self.most_contacts = contact_capacity(self.shapes, self.pairs) + len(self.stops.bound)
+        # a step that is cut also keeps those that have struck and are apart
+        self.capacity = self.most_contacts * (2 if scene.contact.at_touch else 1)
         self.joint_damping = scene_parts.joint_damping_of(scene)
         self.joint_friction = scene_parts.joint_friction_of(scene)
         self.start = scene_parts.start_of(scene)
@@ -340,7 +341,7 @@ class System:
     def decide(self, law: Any, coupling: Coupling | None = None) -> tuple[Effect, ...]:
         """Return the effects under a law and a coupling; the world, the port and the record are
         made from them."""
-        return decide_for(self.scene, self.mechanism, self.shapes, self.pairs, law, coupling)
+        return decide(self, law, coupling)
 
 
 _SYSTEMS: dict[
@@ -356,6 +357,35 @@ def system_of(scene: Scene) -> System:
     for old in [*_SYSTEMS][:-8]:  # of a list, for another thread may change it meanwhile
         _SYSTEMS.pop(old, None)
     return found
+
+
+def decide_effects(
+    scene: Scene,
+    law: ContactLaw | str | None = None,
+    coupling: Coupling | str | None = None,
+    rendering: str | None = None,
+) -> tuple[Effect, ...]:
+    """Decide which effects are on for a scene and for the caller's choices.
+
+    Parameters
+    ----------
+    scene
+        a checked scene.
+    law, coupling
+        the objects, or their names in a run file, such as "penalty" and "four-channel". With None,
+        an effect is on if some law or coupling needs it. The attribute ``uses`` of a law names the
+        parts of the contact section that it uses (`iapb.contact.laws`); a law without it is assumed
+        to use all of them.
+    rendering
+        such as "scale"; default: the rendering of the law.
+
+    Returns
+    -------
+    tuple of Effect
+        all effects in a fixed order, each with its state, the reason, and what would change without
+        it.
+    """
+    return decide(system_of(scene), law, coupling, rendering)
 
 
 def coupling_of(scene: Scene, name: str) -> Coupling:

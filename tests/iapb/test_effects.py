@@ -11,9 +11,10 @@ import pytest
 from ruamel.yaml import YAML
 
 from iapb.contact.laws import ImpulseAugmented, Penalty
-from iapb.effects import COUPLING_FIELDS, EFFECTS, Effect, decide_effects
+from iapb.effects import COUPLING_FIELDS, EFFECTS, Effect
 from iapb.haptics.coupling import FourChannel, UnilateralCoupler
 from iapb.scene import Scene, find_scene, load_scene, scene_names
+from iapb.system import decide_effects
 from reference.time_stepping import RigidConstraints
 
 PEG = load_scene(find_scene("peg_corner"))
