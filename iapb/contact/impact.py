@@ -9,6 +9,7 @@ projector onto the row space of A, which is applied through an orthonormal basis
 from __future__ import annotations
 
 import threading
+from functools import lru_cache
 from numbers import Real
 from typing import Any, NamedTuple
 
@@ -286,16 +287,13 @@ def resolve_frictional_impact(
     c, d = arrays[1].shape
     e = float(_coefficients("restitution", restitution, c, "contact", 0.0))
     mu = _coefficients("friction", friction, c, "contact", 0.0, np.finfo(float).max)
-    T = (
-        _array("tangents", tangents, 2 if np.ndim(tangents) == 2 else 3)
-        if c or np.size(tangents)
-        else np.zeros((0, d))
-    )
-    T = T[:, None] if T.ndim == 2 else T
+    T = np.zeros((0, 1, d))
+    if c or np.size(tangents):
+        T = _array("tangents", tangents, 2 if np.ndim(tangents) == 2 else 3)
+        T = T[:, None] if T.ndim == 2 else T
     if len(T) != c or T.shape[1] not in (1, 2) or T.shape[2] != d:
-        raise ArgumentError(
-            "tangents", np.shape(tangents), f"shape ({c}, {d}) or ({c}, 1 or 2, {d})"
-        )
+        expected = f"shape ({c}, {d}) or ({c}, 1 or 2, {d})"
+        raise ArgumentError("tangents", np.shape(tangents), expected)
     if not np.isfinite(T).all():
         raise ArgumentError("tangents", "a number that is not finite", "finite numbers")
     rough = T.reshape(-1, d), mu, T.shape[1]
@@ -317,7 +315,7 @@ def _resolve_one(
     contacts, d = J.shape
     budget, clamped, tolerance = options
     directions = rough[2] if rough else 0
-    one = _batch_for_one(contacts, d, directions, unequal is not None)
+    one = _KEPT.of_size(contacts, d, directions, unequal is not None)
     one.mass[...] = M
     one.jacobian[...] = J
     one.velocity[...] = v
@@ -392,24 +390,14 @@ class _One:
 
 
 class _Kept(threading.local):
-    """Memory for one impact of each size; each thread has its own."""
+    """Memory for one impact of each size; to make it takes longer than to resolve a small impact.
+    Each thread has its own."""
 
     def __init__(self) -> None:
-        self.of_size: dict[tuple[int, int, int, bool], _One] = {}
+        self.of_size = lru_cache(256)(_One)
 
 
 _KEPT = _Kept()
-_MOST_KEPT = 256
-
-
-def _batch_for_one(*size: Any) -> _One:
-    """Return memory for one impact; to make it takes longer than to resolve a small impact."""
-    kept = _KEPT.of_size
-    if size not in kept:
-        if len(kept) >= _MOST_KEPT:
-            kept.clear()
-        kept[size] = _One(*size)
-    return kept[size]
 
 
 def diagnose(M: Floats, J: Floats, v: Floats, out: Any, refused: int, many: bool) -> IapbError:
@@ -418,13 +406,14 @@ def diagnose(M: Floats, J: Floats, v: Floats, out: Any, refused: int, many: bool
 
     It names the first wrong entry of M, v or J, else the result that is out of range.
     """
-    names, lead = (_MANY, (refused,)) if many else (_ONE, ())
+    names = _MANY if many else _ONE
     M = M[refused]
     J = J[refused]
     v = v[refused]
 
     def named(name: str, *place: Any) -> str:
-        return f"{name}[{', '.join(map(str, (*lead, *place)))}]" if lead or place else name
+        index = ", ".join(map(str, (refused, *place) if many else place))
+        return f"{name}[{index}]" if index else name
 
     for name, array in zip((names[0], names[2], names[1]), (M, v, J), strict=True):
         for place in np.argwhere(~np.isfinite(array))[:1]:
@@ -435,31 +424,27 @@ def diagnose(M: Floats, J: Floats, v: Floats, out: Any, refused: int, many: bool
     exponents = -(np.frexp(np.diag(M))[1] // 2)
     with np.errstate(over="ignore"):
         scaled = np.ldexp(M, exponents[:, None] + exponents)
-    i, j = np.unravel_index(np.argmax(np.abs(scaled)), M.shape)
-    if not abs(scaled[i, j]) <= LARGEST_ENTRY:
-        return ArgumentError(named(names[0], i, j), float(M[i, j]), "a positive definite matrix")
-    i, j = np.unravel_index(np.argmax(np.abs(scaled - scaled.T)), M.shape)
-    if abs(scaled[i, j] - scaled[j, i]) > SYMMETRY_TOLERANCE:
-        return ArgumentError(
-            named(names[0], i, j),
-            float(M[i, j]),
-            f"a symmetric matrix; entry [{j}, {i}] is {float(M[j, i])!r}",
-        )
+    for wrong, limit, expected in (
+        (np.abs(scaled), LARGEST_ENTRY, "a positive definite matrix"),
+        (np.abs(scaled - scaled.T), SYMMETRY_TOLERANCE, "a symmetric matrix"),
+    ):
+        i, j = np.unravel_index(np.argmax(wrong), M.shape)
+        if not wrong[i, j] <= limit:
+            expected += f"; entry [{j}, {i}] is {float(M[j, i])!r}"
+            return ArgumentError(named(names[0], i, j), float(M[i, j]), expected)
     lower = 0.5 * (scaled + scaled.T)
     if pivot := cholesky(lower, lower):
         expected = f"a positive definite matrix (pivot {pivot} of Cholesky is not positive)"
         return ArgumentError(named(names[0]), M, expected)
     if out.numbers[refused, 1] == NOT_CONVERGED:
-        return SolverError(
-            f"Poisson's law: the active-set method did not converge on {len(J)} contacts"
-        )
+        said = "Poisson's law: the active-set method did not converge on"
+        return SolverError(f"{said} {len(J)} contacts")
     quantities = names[2], "generalized_impulse", "impulses", "tangential_impulses"
     for quantity, values in zip(quantities, out.members.values(), strict=False):
         if not np.isfinite(values[refused]).all():
             return RangeError(named(quantity), "the impact of these magnitudes is above 1.8e308")
-    return RangeError(
-        named("energy_change"), "the kinetic energy of these magnitudes is above 1.8e308"
-    )
+    energy = named("energy_change")
+    return RangeError(energy, "the kinetic energy of these magnitudes is above 1.8e308")
 
 
 def _checked(names: tuple[str, str, str], mass_matrix: Any, jacobian: Any, velocity: Any) -> Arrays:
@@ -478,9 +463,8 @@ def _checked(names: tuple[str, str, str], mass_matrix: Any, jacobian: Any, veloc
     empty = rows is not None and rows.shape == (0,)  # [] has no second dimension to check
     J = np.zeros((*lead, 0, d)) if empty else _array(names[1], jacobian, 2 + many)
     if J.shape[:many] != lead or J.shape[-1] != d:
-        raise ArgumentError(
-            names[1], J.shape, f"shape ({', '.join(map(str, (*lead, 'contacts', d)))})"
-        )
+        shape = ", ".join(map(str, (*lead, "contacts", d)))
+        raise ArgumentError(names[1], J.shape, f"shape ({shape})")
     return M, J, v
 
 
@@ -545,19 +529,12 @@ def _options(
         if isinstance(budget, bool) or not isinstance(budget, int | np.integer) or budget < 0:
             raise ArgumentError("budget", budget, "a whole number of rows, 0 or more")
         if not can_stop:
-            raise ArgumentError(
-                "budget",
-                budget,
-                "None: only 'factored', with one restitution for all, can stop early",
-            )
+            expected = "None: only 'factored', with one restitution for all, can stop early"
+            raise ArgumentError("budget", budget, expected)
+        budget = int(budget)
     if clamp is not None and not isinstance(clamp, bool | np.bool_):
         raise ArgumentError("clamp", clamp, "True, False or None")
-    if tolerance is not None and not (
-        isinstance(tolerance, float | int | np.floating) and 0.0 < tolerance < 1.0
-    ):
+    is_number = isinstance(tolerance, float | int | np.floating)
+    if tolerance is not None and not (is_number and 0.0 < tolerance < 1.0):
         raise ArgumentError("rank_tolerance", tolerance, "a number strictly between 0 and 1")
-    return (
-        None if budget is None else int(budget),
-        clamp is None or bool(clamp),
-        float(tolerance or 0.0),
-    )
+    return budget, clamp is None or bool(clamp), float(tolerance or 0.0)
