@@ -103,9 +103,7 @@ class Start:
         self.spatial = isinstance(scene, SpatialScene)
         self.mechanism = system.mechanism
         self.q, self.v = system.start
-        self.pairs = system.pairs
         self.stops = system.stops
-        self.gravity = system.gravity
         self.first_stop = len(self.found.gap) - len(self.stops.body)
 
     @cached_property
@@ -138,7 +136,7 @@ class Start:
         """The contacts between the closest features of each pair, near or far, and the joint
         limits."""
         margin = math.inf
-        if len(self.pairs) > MANY_PAIRS:
+        if len(self.system.pairs) > MANY_PAIRS:
             extents = self.size[: len(self.system.shapes.kind)]
             margin = float(extents[np.isfinite(extents)].max(initial=0.0))
         placed = self.mechanism.placements(self.q)
@@ -225,7 +223,7 @@ class Start:
 
     def applied(self, q: Floats) -> Floats:
         """Generalized force (d,) at q of gravity and of the hand's force at t = 0."""
-        return self.handed(q, 0.0) - self.mechanism.gravity(q, self.gravity)
+        return self.handed(q, 0.0) - self.mechanism.gravity(q, self.system.gravity)
 
     def handed(self, q: Floats, time: float) -> Floats:
         """Generalized force (d,) of the hand at q and at a time [s]."""
@@ -334,7 +332,9 @@ class Start:
                 break
             pushing &= force > 0.0  # a contact that would pull carries nothing
         hand = self.scene.hand.largest_force() if self.scene.hand is not None else 0.0
-        weights = float(np.linalg.norm(self.gravity)) * sum(body.mass for body in self.scene.bodies)
+        weights = float(np.linalg.norm(self.system.gravity)) * sum(
+            body.mass for body in self.scene.bodies
+        )
         # wedges and levers can give more, but less in other poses
         return np.clip(force, 0.0, weights + hand)
 
@@ -408,7 +408,12 @@ def check_scene(
     if laws.PENALTY in uses and scene.contact.forces == "paper":
         found += _too_stiff(start)
         found += _overdriven_friction(start) if laws.FRICTION in uses else ()
-    elif laws.PENALTY in uses and start.spatial and len(start.pairs) and integrator != "momentum":
+    elif (
+        laws.PENALTY in uses
+        and start.spatial
+        and len(start.system.pairs)
+        and integrator != "momentum"
+    ):
         found.append(
             Caution(
                 "integrator",

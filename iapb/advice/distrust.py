@@ -189,9 +189,8 @@ def _alone(seen: _Seen, tree: int, energy: dict[str, Floats]) -> _Book:
     run = seen.run
     alone = seen.mechanism.alone(tree)
     dofs = slice(*seen.mechanism.tree_dofs[tree])
-    forces = run.impulse, run.penalty_force, run.friction_force
-    touched = np.any([force[:, dofs].any(axis=1) for force in forces], axis=0)
-    cut = touched & ~np.isnan(lost_within(run))
+    forces = run.impulse[:, dofs], run.penalty_force[:, dofs], run.friction_force[:, dofs]
+    cut = np.any(forces, axis=(0, 2)) & ~np.isnan(lost_within(run))
     gain = np.cumsum(np.where(cut, 0.0, np.diff(energy["integration_residual"], prepend=0.0)))
     kinds = {body.joint.kind for body in alone.bodies}
     steady = alone.has_constant_mass_matrix and kinds <= STEADY
@@ -214,7 +213,11 @@ def _balance(seen: _Seen, energy: dict[str, Floats], bodies: Booleans, name: str
     friction = energy["friction_work"]
     most = UNACCOUNTED * at_hand + seen.trifle(bodies)
     if not friction.max() <= most:
-        friction = friction - np.cumsum(_booked_late(seen, bodies))
+        # The ledger takes the way of the velocity after the force. Friction that only turns the
+        # velocity, on a turntable, does no work.
+        own = np.isin(seen.mechanism.tree_of_dof, seen.mechanism.tree_of_body[bodies])
+        run = seen.run
+        friction = np.cumsum(_work(run.friction_force[:, own], run.v[:, own], run.dt))
     return _Book(name, friction, _made_inside(energy) - springs, at_hand, most)
 
 
@@ -222,27 +225,6 @@ def _made_inside(energy: dict[str, Floats]) -> Floats:
     """Return the energy (n,) [J] that contacts and integration have added since the start."""
     contacts = energy["penalty_work"] + energy["friction_work"] - energy["impact_loss"]
     return contacts + energy["integration_residual"]
-
-
-def _booked_late(seen: _Seen, bodies: Booleans) -> Floats:
-    """Return how much too high each step's work of friction F is booked (n,) [J]: F M⁻¹ F Δt²/2.
-
-    The ledger takes the way of the velocity after the force, kinetic energy that of the mean
-    velocity. Friction that only turns the velocity, on a turntable, does no work.
-    """
-    run = seen.run
-    mechanism = seen.mechanism
-    late = np.zeros(run.steps)
-    for tree in np.unique(mechanism.tree_of_body[bodies]).tolist():
-        dofs = slice(*mechanism.tree_dofs[tree])
-        force = run.friction_force[:, dofs]
-        rows = np.flatnonzero(force.any(axis=1))
-        constant = mechanism.alone(tree).has_constant_mass_matrix
-        for k in rows[: 1 if constant else None].tolist():
-            at = rows if constant else k
-            inverse = np.linalg.inv(mechanism.mass_matrix(run.q[k])[dofs, dofs])
-            late[at] += 0.5 * run.dt**2 * np.sum(force[at] @ inverse * force[at], axis=-1)
-    return late
 
 
 def _in_overlaps(seen: _Seen, gap: Floats, bodies: Booleans) -> float:
@@ -322,6 +304,7 @@ def _spun(seen: _Seen) -> Iterator[str]:
     force acts on it."""
     run = seen.run
     forces = [run.impulse, *(getattr(run, f"{name}_force") for name in FORCES)]
+    pushed = np.any(forces, axis=0)
     trees = seen.mechanism.tree_of_body.tolist()
     for b, body in enumerate(seen.bodies):
         flat = body.joint == "planar"
@@ -329,7 +312,6 @@ def _spun(seen: _Seen) -> Iterator[str]:
         if not free or trees[b] == seen.carried or any(body.joint_damping + body.joint_friction):
             continue
         dofs = slice(*seen.mechanism.tree_dofs[trees[b]])
-        pushed = np.any([force[:, dofs].any(axis=1) for force in forces], axis=0)
         v = run.v[:, dofs]
         turn, _ = _frames(run, b, np.arange(run.steps + 1))
         if flat:
@@ -347,7 +329,7 @@ def _spun(seen: _Seen) -> Iterator[str]:
         fastest = np.linalg.norm(linear, axis=1).max()
         for what, moved, due, most in (("spin", spin, 0.0, 0.0), ("speed", speed, falls, fastest)):
             changes = np.diff(moved, axis=0) - due
-            changes[pushed] = 0.0
+            changes[pushed[:, dofs].any(axis=1)] = 0.0
             drift = np.linalg.norm(np.cumsum(changes, axis=0), axis=1).max()
             share = float(drift / (max(np.linalg.norm(moved, axis=1).max(), most) + SLOW))
             if not share <= UNACCOUNTED:
@@ -505,32 +487,28 @@ def _squeezed(seen: _Seen) -> Iterator[str]:
     """Say which body moves on by more than its size in a gap that is a tenth of its size too
     narrow."""
     run = seen.run
-    table = seen.run.contacts
+    table = run.contacts
+    step_of = np.repeat(np.arange(run.steps), np.diff(table.offsets))
+    fixed = table.body_b < 0
+    # of two opposed contacts one has half of the overlap
+    deep = fixed & (table.gap < -0.5 * NARROW * seen.sizes[table.body_a])
     for b, size in enumerate(seen.sizes[:-1].tolist()):
-        rows = np.flatnonzero((table.body_a == b) & (table.body_b < 0) & (table.gap < 0.0))
-        # of two opposed contacts one has half of the overlap
-        if not (table.gap[rows] < -0.5 * NARROW * size).any():
-            continue
-        step = np.searchsorted(table.offsets, rows, "right") - 1
-        caught = [np.zeros(0, np.int64)]
+        own = fixed & (table.body_a == b)
         widest = 0.0
-        # the contacts of a step are consecutive
-        for apart in range(1, int(np.bincount(step - step[0]).max())):
-            one = rows[:-apart]
-            other = rows[apart:]
-            narrow = -(table.gap[one] + table.gap[other])
-            facing = np.einsum("ij,ij->i", table.normal[one], table.normal[other]) < -0.9
-            held = (step[:-apart] == step[apart:]) & facing & (narrow > NARROW * size)
-            caught.append(step[:-apart][held])
-            widest = max(widest, float(narrow[held].max(initial=0.0)))
-        places = _places(run)[np.unique(np.concatenate(caught)), b]
+        caught = list[int]()
+        for step in np.unique(step_of[own & deep]).tolist():
+            rows = np.flatnonzero(own[slice(*table.offsets[step : step + 2])]) + table.offsets[step]
+            facing = table.normal[rows] @ table.normal[rows].T < -0.9
+            narrow = -np.add.outer(table.gap[rows], table.gap[rows])[facing].min(initial=0.0)
+            if narrow > NARROW * size:
+                caught.append(step)
+                widest = max(widest, narrow)
+        places = _places(run)[caught, b]
         far = float(np.linalg.norm(places - places[:1], axis=1).max(initial=0.0))
         if far > size:
-            yield (
-                f"{run.body_names[b]} goes on by {in_metres(far)} in a gap that is "
-                f"{in_metres(widest)} narrower "
-                "than it"
-            )
+            name = run.body_names[b]
+            narrower = in_metres(widest)
+            yield f"{name} goes on by {in_metres(far)} in a gap that is {narrower} narrower than it"
             return
 
 
@@ -539,14 +517,15 @@ def _overran(seen: _Seen) -> Iterator[str]:
     at the end."""
     run = seen.run
     most = OVERRUN[seen.scene.contact.forces]
-    limited = zip(seen.mechanism.arrays.q_start, limits_of(seen.scene), strict=True)
-    for i, (low, high) in ((i, limits) for i, limits in limited if limits):
+    for i, limits in zip(seen.mechanism.arrays.q_start, limits_of(seen.scene), strict=True):
+        if limits is None:
+            continue
+        low, high = limits
         beyond = np.maximum(low - run.q[:, i], run.q[:, i] - high) / (high - low)
-        k = len(beyond) - 1 if beyond[-1] > most else int(beyond.argmax())
-        if beyond[k] > (most if k == len(beyond) - 1 else DEEP):
+        k = -1 if beyond[-1] > most else int(beyond.argmax())
+        if k == -1 or beyond[k] > DEEP:
             yield (
                 f"{run.coordinate_names[i]} is {run.q[k, i]:.3g} at {run.time[k]:.4g} s, beyond "
-                f"its limits {low:g} "
-                f"and {high:g} by {beyond[k]:.3g} times their range"
+                f"its limits {low:g} and {high:g} by {beyond[k]:.3g} times their range"
             )
             return
