@@ -18,7 +18,7 @@ from __future__ import annotations
 import difflib
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
@@ -37,10 +37,7 @@ from iapb.numerics.schema import Floats
 WITH_AXIS = ("revolute", "continuous", "prismatic", "planar")
 WITH_RANGE = ("revolute", "prismatic")
 WITH_DYNAMICS = ("revolute", "continuous", "prismatic")
-KIND_OF_TYPE = {
-    **{kind: kind for kind in ("fixed", *WITH_AXIS)},
-    "floating": "free_flyer",
-}
+KIND_OF_TYPE = {kind: kind for kind in ("fixed", *WITH_AXIS)} | {"floating": "free_flyer"}
 # children that are read, and attributes, of the elements that are read
 _CHILDREN: dict[str, tuple[str, ...]] = {
     "robot": ("link", "joint"),
@@ -121,11 +118,10 @@ def read_robot(
     inertials = {
         name: _inertial(element) for name, element in elements_by_name(robot, "link").items()
     }
-    elements = elements_by_name(robot, "joint")
-    joints = _Joints(elements, ignored)
+    joints = elements_by_name(robot, "joint")
     held: dict[str, Link] = {}  # links that a joint carries
     children: dict[str, list[str]] = {name: [] for name in inertials}
-    for name, element in sorted(elements.items(), key=lambda item: item[0].encode()):
+    for name, element in sorted(joints.items(), key=lambda item: item[0].encode()):
         where = where_of(element)
         parent, child = (_end(element, tag, inertials) for tag in ("parent", "child"))
         if child in held:
@@ -136,30 +132,29 @@ def read_robot(
                 f"{_leaving(name, 'joint')}",
             )
         body = Body(child, parent, _joint(element), origin_of(element, where), *inertials[child])
-        held[child] = joints.link(element, body)
+        held[child] = _link(element, body, joints, ignored)
         children[parent].append(child)
-    joints.refuse_empty_ranges()
+    _refuse_empty_ranges(held.values())
     roots = [name for name in inertials if name not in held]
     if len(roots) != 1:
         raise ArgumentError("links without a parent", roots, "exactly one, the root")
     base = Joint("free_flyer" if floating_base else "fixed")
-    links = [Link(Body(roots[0], None, base, _HERE, *inertials[roots[0]]), roots[0])]
+    held[roots[0]] = Link(Body(roots[0], None, base, _HERE, *inertials[roots[0]]), roots[0])
     # instead of recursion, for any depth
-    stack = children[roots[0]][::-1]
-    reached = set(roots)
+    stack = roots
+    reached = list[str]()
     while stack:
-        link = stack.pop()
-        reached.add(link)
-        links += _with_plane(held[link])
-        stack.extend(children[link][::-1])
+        reached.append(stack.pop())
+        stack += reversed(children[reached[-1]])
     if lost := sorted(inertials.keys() - reached):
         raise ArgumentError(
             "links",
             lost,
-            f"joints that connect each link to the root {roots[0]!r}; the joints of "
+            f"joints that connect each link to the root {reached[0]!r}; the joints of "
             "these links form a loop",
         )
-    return UrdfRobot(links, joints.remarks())
+    links = [link for name in reached for link in _with_plane(held[name])]
+    return UrdfRobot(links, _remarks(joints, ignored))
 
 
 _HERE = (np.eye(3), np.zeros(3))
@@ -184,7 +179,7 @@ def _leave_out(robot: ElementTree.Element, leave_out: LeaveOut) -> None:
             joint.set("type", "fixed")
 
 
-def _leaving(joint: str, part: str) -> str:
+def _leaving(joint: str | None, part: str) -> str:
     return f"leave_out: {{{joint}: [{part}]}} leaves it out"
 
 
@@ -223,103 +218,111 @@ def _to_axis(axis: Floats) -> Floats:
     return np.column_stack([first, np.cross(axis, first), axis])
 
 
-class _Joints:
-    """Reads what joints have beside their kind, and keeps what is to be said about it."""
+def _link(
+    joint: ElementTree.Element,
+    body: Body,
+    joints: dict[str, ElementTree.Element],
+    ignored: Counter[str],
+) -> Link:
+    """Return a body with what its joint has beside its kind."""
+    damping, friction = (_dynamics(joint, name, ignored) for name in ("damping", "friction"))
+    name = str(joint.get("name"))
+    if mimic := _mimic(joint, joints, ignored):
+        kind = "prismatic" if body.joint.kind == "prismatic" else "revolute"
+        body = replace(body, joint=Joint(kind, body.joint.axis), mimic=mimic)
+    return Link(body, body.name, name, _limits(joint, ignored), damping, friction)
 
-    def __init__(self, elements: dict[str, ElementTree.Element], ignored: Counter[str]) -> None:
-        self.elements = elements
-        self.ignored = ignored
-        self.empty: list[str] = []  # joints whose range is a point
-        self.unlimited: list[str] = []
 
-    def link(self, element: ElementTree.Element, body: Body) -> Link:
-        """Return a body with what its joint has."""
-        damping, friction = (self._dynamics(element, name) for name in ("damping", "friction"))
-        name = str(element.get("name"))
-        if mimic := self._mimic(element, name):
-            kind = "prismatic" if body.joint.kind == "prismatic" else "revolute"
-            body = replace(body, joint=Joint(kind, body.joint.axis), mimic=mimic)
-        return Link(body, body.name, name, self._limits(element), damping, friction)
+def _mimic(
+    joint: ElementTree.Element, joints: dict[str, ElementTree.Element], ignored: Counter[str]
+) -> Mimic | None:
+    """Return what a joint follows; a fixed joint follows nothing."""
+    mimic = joint.find("mimic")
+    kind = joint.get("type")
+    if mimic is None:
+        return None
+    if kind == "fixed":
+        ignored["<mimic> of fixed joints"] += 1
+        return None
+    where = f"{where_of(joint)} mimic"
+    name = mimic.get("joint", "")
+    leader = joints.get(name, ElementTree.Element("joint"))
+    child = leader.find("child")
+    leads = leader.get("type") in WITH_RANGE and leader.find("mimic") is None
+    if kind not in WITH_DYNAMICS or not leads or child is None:
+        expected = "a revolute, continuous or prismatic joint that follows a revolute or "
+        expected += f"prismatic one, which follows none; {_leaving(joint.get('name'), 'mimic')}"
+        raise ArgumentError(where, name, expected)
+    multiplier = _number(where, mimic, "multiplier", "1")
+    return Mimic(child.get("link", ""), multiplier, _number(where, mimic, "offset", "0"))
 
-    def _mimic(self, element: ElementTree.Element, name: str) -> Mimic | None:
-        """Return what a joint follows; a fixed joint follows nothing."""
-        mimic = element.find("mimic")
-        kind = element.get("type")
-        if mimic is None:
-            return None
-        if kind == "fixed":
-            self.ignored["<mimic> of fixed joints"] += 1
-            return None
-        where = f"{where_of(element)} mimic"
-        leader = mimic.get("joint", "")
-        found = self.elements.get(leader)
-        leads = found is not None and found.get("type") in WITH_RANGE
-        child = found.find("child") if found is not None and found.find("mimic") is None else None
-        if kind not in WITH_DYNAMICS or not leads or child is None:
-            expected = "a revolute, continuous or prismatic joint that follows a revolute or "
-            expected += f"prismatic one, which follows none; {_leaving(name, 'mimic')}"
-            raise ArgumentError(where, leader, expected)
-        multiplier = _number(where, mimic, "multiplier", "1")
-        return Mimic(child.get("link", ""), multiplier, _number(where, mimic, "offset", "0"))
 
-    def _limits(self, element: ElementTree.Element) -> tuple[float, float] | None:
-        limit = element.find("limit")
-        kind = element.get("type")
-        name = str(element.get("name"))
-        if kind not in WITH_RANGE:
-            self.ignored[f"<limit> of {kind} joints"] += limit is not None
-            return None
-        if limit is None:
-            self.unlimited.append(name)
-            return None
-        where = f"{where_of(element)} limit"
-        lower, upper = (_number(where, limit, bound, "0") for bound in ("lower", "upper"))
-        if lower > upper:
-            raise ArgumentError(where, [lower, upper], f"lower < upper; {_leaving(name, 'limit')}")
-        self.empty += [name] * (lower == upper)
-        if max(-lower, upper) > FARTHEST and min(-lower, upper) > FARTHEST:
-            return None
-        return max(lower, -FARTHEST), min(upper, FARTHEST)
+def _limits(joint: ElementTree.Element, ignored: Counter[str]) -> tuple[float, float] | None:
+    """Return the range of a joint; None if it has none."""
+    limit = joint.find("limit")
+    kind = joint.get("type")
+    if limit is None:
+        return None
+    if kind not in WITH_RANGE:
+        ignored[f"<limit> of {kind} joints"] += 1
+        return None
+    where = f"{where_of(joint)} limit"
+    lower, upper = (_number(where, limit, bound, "0") for bound in ("lower", "upper"))
+    if lower > upper:
+        leaving = _leaving(joint.get("name"), "limit")
+        raise ArgumentError(where, [lower, upper], f"lower < upper; {leaving}")
+    if max(-lower, upper) > FARTHEST and min(-lower, upper) > FARTHEST:
+        return None
+    return max(lower, -FARTHEST), min(upper, FARTHEST)
 
-    def _dynamics(self, element: ElementTree.Element, name: str) -> float:
-        """Return damping or friction of a joint."""
-        dynamics = element.find("dynamics")
-        kind = element.get("type")
-        if dynamics is None:
-            return 0.0
-        where = f"{where_of(element)} dynamics"
-        value = _number(where, dynamics, name, "0")
-        if value < 0.0:
-            raise ArgumentError(f"{where} {name}", value, "a number >= 0")
-        if kind in WITH_DYNAMICS or value == 0.0:
-            return value
-        if kind != "fixed":
-            leaving = _leaving(str(element.get("name")), "dynamics")
-            raise ArgumentError(f"{where} {name}", value, f"none of a {kind} joint; {leaving}")
-        self.ignored["<dynamics> of fixed joints"] += 1
+
+def _dynamics(joint: ElementTree.Element, name: str, ignored: Counter[str]) -> float:
+    """Return damping or friction of a joint."""
+    dynamics = joint.find("dynamics")
+    kind = joint.get("type")
+    if dynamics is None:
         return 0.0
+    where = f"{where_of(joint)} dynamics"
+    value = _number(where, dynamics, name, "0")
+    if value < 0.0:
+        raise ArgumentError(f"{where} {name}", value, "a number >= 0")
+    if kind in WITH_DYNAMICS or value == 0.0:
+        return value
+    if kind != "fixed":
+        leaving = _leaving(joint.get("name"), "dynamics")
+        raise ArgumentError(f"{where} {name}", value, f"none of a {kind} joint; {leaving}")
+    ignored["<dynamics> of fixed joints"] += 1
+    return 0.0
 
-    def refuse_empty_ranges(self) -> None:
-        """Refuse joints that their range locks, for a limit here lets the joint move."""
-        if self.empty:
-            leaving = ", ".join(f"{name}: [limit]" for name in self.empty)
-            raise ArgumentError(
-                "<limit>",
-                self.empty,
-                "lower < upper (both are 0 by default, which locks the joint); "
-                f"leave_out: {{{leaving}}} lets it turn without limits",
-            )
 
-    def remarks(self) -> tuple[str, ...]:
-        """Return sentences on what has no limits and on what is ignored."""
-        said = []
-        if self.unlimited:
-            said.append(f"without <limit>, so without limits: {', '.join(self.unlimited)}")
-        if ignored := +self.ignored:  # without counts of zero
-            counts = (f"{what} ({count})" for what, count in ignored.items())
-            shapes = any(f"<{tag}>" in ignored for tag in _SHAPES)
-            said.append(f"ignored: {', '.join(counts)}" + "; the scene gives shapes" * shapes)
-        return tuple(said)
+def _refuse_empty_ranges(links: Iterable[Link]) -> None:
+    """Refuse joints that their range locks, for a limit here lets the joint move."""
+    empty = [link.joint for link in links if link.limits and link.limits[0] == link.limits[1]]
+    if empty:
+        leaving = ", ".join(f"{name}: [limit]" for name in empty)
+        raise ArgumentError(
+            "<limit>",
+            empty,
+            "lower < upper (both are 0 by default, which locks the joint); "
+            f"leave_out: {{{leaving}}} lets it turn without limits",
+        )
+
+
+def _remarks(joints: dict[str, ElementTree.Element], ignored: Counter[str]) -> tuple[str, ...]:
+    """Return sentences on what has no limits and on what is ignored."""
+    said = []
+    unlimited = [
+        name
+        for name, joint in joints.items()
+        if joint.get("type") in WITH_RANGE and joint.find("limit") is None
+    ]
+    if unlimited:
+        said.append(f"without <limit>, so without limits: {', '.join(sorted(unlimited))}")
+    if ignored:
+        counts = ", ".join(f"{what} ({count})" for what, count in ignored.items())
+        shapes = any(f"<{tag}>" in ignored for tag in _SHAPES)
+        said.append(f"ignored: {counts}" + "; the scene gives shapes" * shapes)
+    return tuple(said)
 
 
 def _number(where: str, element: ElementTree.Element, name: str, default: str) -> float:
@@ -338,12 +341,11 @@ def _inertial(link: ElementTree.Element) -> tuple[Any, ...]:
     if mass is None or tensor is None:
         raise ArgumentError(where, "incomplete", "a <mass> and an <inertia>")
     rotation, center = origin_of(inertial, where)
-    matrix = np.array(
-        [
-            [numbers_in(f"{where} inertia {key}", tensor.get(key), 1)[0] for key in keys.split()]
-            for keys in ("ixx ixy ixz", "ixy iyy iyz", "ixz iyz izz")
-        ]
+    xx, xy, xz, yy, yz, zz = (
+        numbers_in(f"{where} inertia {key}", tensor.get(key), 1)[0]
+        for key in _ATTRIBUTES["inertia"]
     )
+    matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     turned = turned_inertia(rotation, matrix)
     return numbers_in(f"{where} mass", mass.get("value"), 1)[0], center, 0.5 * (turned + turned.T)
 
@@ -353,14 +355,15 @@ def _joint(element: ElementTree.Element) -> Joint:
     kind = element.get("type", "")
     axis = element.find("axis")
     if kind not in KIND_OF_TYPE:
-        leaving = _leaving(str(element.get("name")), "joint")
+        leaving = _leaving(element.get("name"), "joint")
         raise ArgumentError(f"{where} type", kind, f"{one_of(kind, KIND_OF_TYPE)}; {leaving}")
     along = np.array((1.0, 0.0, 0.0))  # default of the specification
     if kind in WITH_AXIS and axis is not None:
         along = numbers_in(f"{where} axis", axis.get("xyz"), 3)
         if not along.any():
             raise ArgumentError(f"{where} axis", axis.get("xyz"), "a vector that is not zero")
-    return Joint(KIND_OF_TYPE[kind], (float(along[0]), float(along[1]), float(along[2])))
+    x, y, z = along.tolist()
+    return Joint(KIND_OF_TYPE[kind], (x, y, z))
 
 
 class _Builder(ElementTree.TreeBuilder):
