@@ -11,7 +11,7 @@ import copy
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Set
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 from pydantic import (
     BeforeValidator,
@@ -493,6 +493,31 @@ class SpatialScene(Scene):
     )
 
 
+class _Outline(NamedTuple):
+    """What the other parts of a file may refer to, of one body; None where it is wrong."""
+
+    name: str | None
+    parent: str | None
+    joint: str | None
+    follows: Any  # its joint_mimic
+    root: str | None  # name of its tree's root
+    shapes: int
+
+
+def _outlines(given: dict[str, Any]) -> list[_Outline]:
+    """Return the outlines of the bodies."""
+    root: dict[str | None, str | None] = {}
+    found = []
+    for body in _mappings(given, "bodies"):
+        name = _text(body, "name")
+        parent = _text(body, "parent", WORLD)
+        own = root.setdefault(name, name if parent == WORLD else root.get(parent))
+        shapes = len(_mappings(body, "shapes"))
+        joint = _text(body, "joint")
+        found.append(_Outline(name, parent, joint, body.get("joint_mimic"), own, shapes))
+    return found
+
+
 def _across_parts(given: Any) -> Mistakes:
     """Yield path, value and expectation of each mistake between the parts: names, parents, lists as
     long as the tool.
@@ -501,46 +526,49 @@ def _across_parts(given: Any) -> Mistakes:
     """
     if not isinstance(given, dict):
         return
-    bodies = _mappings(given, "bodies")
+    bodies = _outlines(given)
     walls = _mappings(given, "walls")
-    for where, items, known in (
-        ("bodies", bodies, {WORLD: "the static world"}),
-        ("walls", walls, {}),
-    ):
-        for i, item in enumerate(items):
-            name = _text(item, "name")
+    names = [body.name for body in bodies]
+    known: dict[str | None, str] = {WORLD: "the static world"}
+    for part, own in (("bodies", names), ("walls", [_text(wall, "name") for wall in walls])):
+        for i, name in enumerate(own):
             if name in known:
-                yield (where, i, "name"), name, f"a name of its own: {known[name]} has this one"
+                yield (part, i, "name"), name, f"a name of its own: {known[name]} has this one"
             elif name is not None:
-                known[name] = "an earlier one"
-    names = [_text(body, "name") for body in bodies]
-    roots = _roots(bodies)
+                known[name] = "an earlier one" if part == "walls" else "a body"
+    roots = [body.root for body in bodies]
     for i, body in enumerate(bodies):
-        parent = _text(body, "parent", WORLD)
-        if parent not in (None, WORLD) and parent not in names[:i]:
-            order = "listed before it" if parent in names else "of this scene"
-            yield ("bodies", i, "parent"), parent, f"world, or the name of a body {order}"
+        if body.parent not in (None, WORLD, *names[:i]):
+            order = "listed before it" if body.parent in names else "of this scene"
+            yield ("bodies", i, "parent"), body.parent, f"world, or the name of a body {order}"
         # M would not be block diagonal
-        if i and roots[i] not in (None, roots[i - 1]) and roots[i] in roots[:i]:
-            yield ("bodies", i), names[i], f"its place among the other bodies of {roots[i]}'s tree"
-    if bodies and all(body.get("joint") == "fixed" for body in bodies):
+        if i and body.root not in (None, roots[i - 1]) and body.root in roots[:i]:
+            expected = f"its place among the other bodies of {body.root}'s tree"
+            yield ("bodies", i), body.name, expected
+        leader = _text(body.follows, "body")
+        leaders = [one.name for one in bodies if one.root == body.root and _leads(one)]
+        if leader is not None and leader not in leaders:
+            expected = "a revolute or prismatic body of the same tree that follows no other"
+            yield ("bodies", i, "joint_mimic", "body"), leader, expected
+    if bodies and all(body.joint == "fixed" for body in bodies):
         yield ("bodies", 0, "joint"), "fixed", "at least one body of the scene that can move"
-    yield from _mimics(bodies, names, roots)
-    count = len(walls) + sum(len(_mappings(body, "shapes")) for body in bodies)
+    count = len(walls) + sum(body.shapes for body in bodies)
     if count > MAX_SHAPES:
         yield ("bodies",), f"{count} shapes", f"at most {MAX_SHAPES} shapes, walls included"
-    yield from _tool(given, bodies, names, roots)
+    yield from _tool(given, bodies)
+
+
+def _leads(body: _Outline) -> bool:
+    return body.joint in ("revolute", "prismatic") and not body.follows
 
 
 def _mappings(given: Any, field: str) -> list[dict[str, Any]]:
     """Return the items of a list; an item that is no mapping becomes an empty one, to keep the
     numbering."""
     items = given.get(field) if isinstance(given, dict) else None
-    return (
-        [item if isinstance(item, dict) else {} for item in items]
-        if isinstance(items, list | tuple)
-        else []
-    )
+    if not isinstance(items, list | tuple):
+        return []
+    return [item if isinstance(item, dict) else {} for item in items]
 
 
 def _text(given: Any, field: str, default: str | None = None) -> str | None:
@@ -548,39 +576,13 @@ def _text(given: Any, field: str, default: str | None = None) -> str | None:
     return text if isinstance(text, str) else None
 
 
-def _roots(bodies: list[dict[str, Any]]) -> list[str | None]:
-    """Return the name of each body's root; None if names or parents are wrong."""
-    root: dict[str | None, str | None] = {}
-    for body in bodies:
-        name = _text(body, "name")
-        parent = _text(body, "parent", WORLD)
-        root.setdefault(name, name if parent == WORLD else root.get(parent))
-    return [root[_text(body, "name")] for body in bodies]
-
-
-def _mimics(
-    bodies: list[dict[str, Any]], names: list[str | None], roots: list[str | None]
-) -> Mistakes:
-    """Check that each joint that follows another one finds it, with a coordinate, in its tree."""
-    for i, body in enumerate(bodies):
-        leader = _text(body.get("joint_mimic"), "body")
-        if leader is None:
-            continue
-        found = bodies[names.index(leader)] if leader in names else {}
-        one = _text(found, "joint") in ("revolute", "prismatic") and not found.get("joint_mimic")
-        if not one or roots[names.index(leader)] != roots[i]:
-            expected = "a revolute or prismatic body of the same tree that follows no other"
-            yield ("bodies", i, "joint_mimic", "body"), leader, expected
-
-
-def _tool(
-    given: Any, bodies: list[dict[str, Any]], names: list[str | None], roots: list[str | None]
-) -> Mistakes:
+def _tool(given: dict[str, Any], bodies: list[_Outline]) -> Mistakes:
     """Check that the hand's body exists and moves, and that its lists have one entry per coordinate
     of the tool."""
     hand = given.get("hand")
     gains = given.get("couplings")
-    held = _text(given.get("hand"), "body")
+    held = _text(hand, "body")
+    names = [body.name for body in bodies]
     sections: list[tuple[Path, Any]] = [(("device",), given.get("device"))]
     if hand is None:
         for path, section in (*sections, (("couplings",), gains)):
@@ -591,30 +593,21 @@ def _tool(
     if held not in names:
         yield ("hand", "body"), held, "the name of a body of this scene"
         return
-    root = roots[names.index(held)]
-    joints = [_text(body, "joint") for body in bodies]
-    if root is None or None in roots or not all(joint in KINDS for joint in joints):
+    root = bodies[names.index(held)].root
+    if root is None or not all(body.root and body.joint in KINDS for body in bodies):
         return
-    coordinates = sum(
-        KINDS[str(joint)].nv
-        for joint, own, body in zip(joints, roots, bodies, strict=True)
-        if own == root and not body.get("joint_mimic")
-    )
+    tool = [body for body in bodies if body.root == root and not body.follows]
+    coordinates = sum(KINDS[str(body.joint)].nv for body in tool)
     if coordinates == 0:
         yield ("hand", "body"), held, "a body that can move"
     if isinstance(gains, dict):
-        sections += [
-            (("couplings", name), gains.get(name)) for name in ("four_channel", "unilateral")
-        ]
+        sections += [(("couplings", name), gains.get(name)) for name in Couplings.model_fields]
     for path, section in sections:
         for field in ("force_limit", "position_resolution", "stiffness", "damping"):
             numbers = section.get(field) if isinstance(section, dict) else None
             if isinstance(numbers, list | tuple) and len(numbers) != coordinates:
-                yield (
-                    (*path, field),
-                    numbers,
-                    f"{counted(coordinates)}, one per coordinate of the tool",
-                )
+                expected = f"{counted(coordinates)}, one per coordinate of the tool"
+                yield (*path, field), numbers, expected
 
 
 def scene_kind(given: Any) -> type[Scene]:

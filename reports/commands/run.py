@@ -166,6 +166,7 @@ def describe(run: Run, existed: bool) -> Iterator[str]:
         yield f"Recorded are {run.steps} of them: one of {run.every}, and those with an impact."
     if len(impacts.step):
         lost = sum(float(np.sum(block)) for block in blocks(impacts.energy_lost))
+        lost = round(lost, 15) + 0.0  # rounding errors are printed as 0
         most = max(int(block.max()) for block in blocks(impacts.rows))
         yield (
             f"{counted(len(impacts.step), 'impact')}, the first at "

@@ -121,7 +121,7 @@ def answer_of(resolver: Resolver, given: tuple[Any, ...]) -> Floats | ResolverFa
         )
     velocity = velocity.astype(np.float64)
     if not np.all(np.isfinite(velocity)):
-        return ResolverFault("returned a velocity that is not finite")
+        return ResolverFault("returned a number that is not finite")
     return velocity
 
 
