@@ -68,7 +68,7 @@ class System:
         self.scene = scene
         self.mechanism: Mechanism = scene_parts.mechanism_of(scene)
         self.shapes = scene_parts.shapes_of(scene)
-        self.pairs, self.remarks = scene_parts.pairs_and_remarks(scene, self.shapes)
+        self.pairs, self.remarks = scene_parts.pairs_of(scene, self.mechanism, self.shapes)
         self.stops = scene_parts.stops_of(scene, self.mechanism)
         self.most_contacts = contact_capacity(self.shapes, self.pairs) + len(self.stops.bound)
         # a step that is cut also keeps those that have struck and are apart

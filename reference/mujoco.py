@@ -42,6 +42,7 @@ from iapb.mechanics.joints import KINDS, Mimic
 from iapb.run import INTERRUPTED, Run
 from iapb.scene import Scene
 from iapb.scene import mechanism as scene_parts
+from iapb.system import System, system_of
 from reference import Floats
 
 HARD = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # solimp: the largest impedance that MuJoCo accepts
@@ -94,9 +95,7 @@ class MuJoCo:
         """Return the fields of the scene that the model lacks."""
         given = [body.joint_damping for body in scene.bodies if body.joint in TURNING]
         uneven = any(len({*damping[:3]}) > 1 or len({*damping[3:]}) > 1 for damping in given)
-        values = scene_parts.restitutions_of(
-            scene, scene_parts.pairs_of(scene, scene_parts.shapes_of(scene))
-        )
+        values = system_of(scene).restitutions
         slight = bool(np.any((values > 0.0) & (values < LEAST_RESTITUTION)))
         return (
             *fields_of_our_engine(scene),
@@ -175,17 +174,18 @@ class MuJoCo:
         spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_AUTORESET
         flat = len(scene.bodies[0].origin) == 2
         made: dict[str | None, Any] = {None: spec.worldbody}
-        for body, given in zip(scene_parts.mechanism_of(scene).bodies, scene.bodies, strict=True):
+        for body, given in zip(system_of(scene).mechanism.bodies, scene.bodies, strict=True):
             made[body.name] = _add_body(made[body.parent], body, flat)
             if given.joint_limits is not None:
                 self._limit(made[body.name].joints[0], given.joint_limits, scene)
             if given.joint_mimic is not None:
                 _follow(spec, made, body)
-        shapes = scene_parts.shapes_of(scene)
+        system = system_of(scene)
+        shapes = system.shapes
         for i, owner in enumerate(shapes.body):
             carrier = spec.worldbody if owner < 0 else made[scene.bodies[owner].name]
             _add_geom(spec, carrier, shapes, i)
-        self._add_pairs(spec, scene, shapes)
+        self._add_pairs(spec, system)
         model = spec.compile()
         for place, given in zip(joint_places(scene, model), scene.bodies, strict=True):
             damping = given.joint_damping
@@ -207,10 +207,11 @@ class MuJoCo:
         joint.solref_limit = self.solref(scene.contact.restitution, scene.step / self.substeps)
         joint.solimp_limit = HARD
 
-    def _add_pairs(self, spec: Any, scene: Scene, shapes: Shapes) -> None:
+    def _add_pairs(self, spec: Any, system: System) -> None:
         """List the pairs of shapes that can touch, each with its friction and restitution."""
-        pairs = scene_parts.pairs_of(scene, shapes)
-        frictions = scene_parts.frictions_of(scene).by_pair(pairs)
+        scene = system.scene
+        pairs = system.pairs
+        frictions = system.frictions.by_pair(pairs)
         restitutions = scene_parts.restitution_by_pair(scene, pairs)
         for (a, b), friction, restitution in zip(pairs, frictions, restitutions, strict=True):
             spec.add_pair(

@@ -24,8 +24,9 @@ from iapb.contact.laws import ENGINE_LAWS, ImpulseAugmented
 from iapb.errors import ArgumentError, IapbError
 from iapb.numerics.schema import Booleans, Floats, Integers
 from iapb.run import Run, digests
-from iapb.scene.mechanism import mechanism_of, pairs_of, restitutions_of, shapes_of, start_of
+from iapb.scene.mechanism import mechanism_of, start_of
 from iapb.scene.reading import scene_from_values
+from iapb.system import system_of
 from reference.exact import relative_energy_gain
 
 Batch = tuple[
@@ -508,7 +509,7 @@ def _contacts(run: Any, silent: bool) -> tuple[float, float]:
     rubbing = run.law_settings.get("friction_in_impacts") and scene.largest_friction > 0
     if rubbing or scene.contact.self_collision_rows == "per_body":
         return np.nan, np.nan
-    values = restitutions_of(scene, pairs_of(scene, shapes_of(scene)))
+    values = system_of(scene).restitutions
     equality = len(values) == 1 and not run.law_settings.get("pushing")
     # contacts are recorded at one moment: steps with impacts at different ones are not judged
     _, first, line = np.unique(impacts.step, return_index=True, return_inverse=True)

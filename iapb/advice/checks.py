@@ -754,7 +754,7 @@ def _loops(start: Start, coupling: str) -> dict[str, HapticLoop]:
         np.array(gains.stiffness),
         np.array(gains.damping),
         device_damping=np.array((device and device.damping) or np.zeros(len(mass))),
-        joint_damping=mechanism.joint_damping_of(scene)[tool],
+        joint_damping=start.system.joint_damping[tool],
         delay=device.delay if device is not None else 0,
         dt=start.dt,
         spring=np.zeros_like(mass),

@@ -200,11 +200,7 @@ class Mechanism:
 
     def mass_matrix(self, q: ArrayLike) -> Floats:
         """Return M(q) (d, d)."""
-        place = float_array("q", q, (self.nq,))
-        out = np.empty((1, self.nv, self.nv))
-        if not _KERNELS.mass_matrices_at(self._parts, self._scratch.parts, place[None], out):
-            self._place(place)
-        return out[0]
+        return self.mass_matrices(self._place(q)[None])[0]
 
     def mass_matrices(self, qs: ArrayLike) -> Floats:
         """Return M (n, d, d) at each of the n configurations qs (n, nq), in one compiled call."""
@@ -237,13 +233,7 @@ class Mechanism:
     def bias(self, q: ArrayLike, v: ArrayLike) -> Floats:
         """Return B(q, v) (d,), Coriolis and centripetal generalized forces (gravity not
         included)."""
-        place = float_array("q", q, (self.nq,))
-        rates = float_array("v", v, (self.nv,))
-        out = np.empty((1, self.nv))
-        if not _KERNELS.biases_at(self._parts, self._scratch.parts, place[None], rates[None], out):
-            self._place(place)
-            self._rates(rates)
-        return out[0]
+        return self.biases(self._place(q)[None], self._rates(v)[None])[0]
 
     def biases(self, qs: ArrayLike, vs: ArrayLike) -> Floats:
         """Return B (n, d) at each of the n states qs (n, nq), vs (n, d), in one compiled call."""

@@ -30,26 +30,23 @@ def collect_arrays(bodies: tuple[Body, ...], parents: list[int]) -> MechanismArr
     follows = np.array([body.mimic is not None for body in bodies], np.bool_)
     v_count = np.array([layout.nv for layout in layouts], np.int64)
     q_own = np.where(follows, 0, np.array([layout.nq for layout in layouts], np.int64))
-    v_own = np.where(follows, 0, v_count)
     q_start = np.cumsum(q_own) - q_own
-    v_start = np.cumsum(v_own) - v_own
-    total = int(v_own.sum())
-    v_start[follows] = total + np.arange(follows.sum())
-    motions = int(v_count.sum())
+    order = np.argsort(follows, kind="stable")  # those that follow another one are the last
+    v_start = np.zeros(count, np.int64)
+    v_start[order] = np.cumsum(v_count[order]) - v_count[order]
+    dof_body = np.repeat(order, v_count[order])
+    dof_rotates = np.array([turns for b in order for turns in layouts[b].rotating], np.bool_)
+    motions = len(dof_body)
+    dof_parent = np.arange(motions) - 1
     last_dof: list[int] = []  # of each body, on the path from the world
-    dof_parent, dof_body = np.zeros((2, motions), np.int64)
-    dof_rotates = np.zeros(motions, np.bool_)
+    for b, parent in enumerate(parents):
+        last_dof.append(last_dof[parent] if parent >= 0 else -1)
+        if v_count[b]:
+            dof_parent[v_start[b]] = last_dof[b]
+            last_dof[b] = int(v_start[b] + v_count[b] - 1)
     dof_leader = np.arange(motions)
     dof_ratio = np.ones(motions)
     dof_offset = np.zeros(motions)
-    for b, (parent, layout) in enumerate(zip(parents, layouts, strict=True)):
-        last = last_dof[parent] if parent >= 0 else -1
-        for k, turns in enumerate(layout.rotating, int(v_start[b])):
-            dof_parent[k] = last
-            dof_body[k] = b
-            dof_rotates[k] = turns
-            last = k
-        last_dof.append(last)
     for b in np.flatnonzero(follows).tolist():
         mimic = bodies[b].mimic or Mimic("")
         k = v_start[b]
@@ -90,6 +87,15 @@ def _leader(bodies: tuple[Body, ...], name: str) -> int:
     raise ArgumentError("mimic", name, "a revolute or prismatic body that follows no other")
 
 
+def carriers(m: MechanismArrays) -> Integers:
+    """Return the moving body that each body is fixed to, itself if it moves; -1 is the world."""
+    found: list[int] = []
+    for b, parent in enumerate(m.parent.tolist()):
+        beneath = found[parent] if parent >= 0 else -1
+        found.append(b if m.v_count[b] else beneath)
+    return np.array(found, np.int64)
+
+
 def moving_parts(m: MechanismArrays) -> MechanismArrays:
     """Return arrays of the moving bodies alone, each with the mass of the bodies fixed to it; the
     dofs are the same.
@@ -98,13 +104,9 @@ def moving_parts(m: MechanismArrays) -> MechanismArrays:
     tool frames).
     """
     moves = m.v_count > 0
-    carrier: list[
-        int
-    ] = []  # the moving body that carries each body, -1: the world; it carries itself
-    placed: list[
-        tuple[Floats, Floats]
-    ] = []  # joint frame of each body in the frame of its parent's carrier
-    own: list[tuple[Floats, Floats]] = []  # its axes and origin in its carrier's frame
+    carrier = carriers(m)
+    placed: list[tuple[Floats, Floats]] = []  # joint frames in the frames of the parents' carriers
+    own: list[tuple[Floats, Floats]] = []  # axes and origin of each body in its carrier's frame
     for b, parent in enumerate(m.parent.tolist()):
         rotation = m.placement_rotation[b]
         position = m.placement_position[b]
@@ -114,25 +116,16 @@ def moving_parts(m: MechanismArrays) -> MechanismArrays:
             position = shift + product(turn, position)
         placed.append((rotation, position))
         own.append((np.eye(3), np.zeros(3)) if moves[b] else placed[b])
-        carrier.append(b if moves[b] else carrier[parent] if parent >= 0 else -1)
     moving = np.flatnonzero(moves)
-    carriers = np.array(carrier)
-    new_index = {b: i for i, b in enumerate(moving.tolist())} | {-1: -1}
-    parts = m._replace(
-        **{
-            name: rows[moving]
-            for name, rows in m._asdict().items()
-            if not name.startswith(("dof_", "quaternions"))
-        }
-    )
-    parts = parts._replace(
-        parent=np.array(
-            [new_index[carrier[p] if p >= 0 else -1] for p in m.parent[moving]], np.int64
-        ),
-        dof_body=np.array([new_index[b] for b in m.dof_body.tolist()], np.int64),
+    new_index = np.append(np.cumsum(moves) - 1, -1)  # the last one is that of the world, -1
+    of_joints = ("dof_", "quaternions")
+    kept = {k: rows[moving] for k, rows in m._asdict().items() if not k.startswith(of_joints)}
+    parts = m._replace(**kept)._replace(
+        parent=new_index[np.append(carrier, -1)[m.parent[moving]]],
+        dof_body=new_index[m.dof_body],
     )
     for i, body in enumerate(moving):
-        members = np.flatnonzero(carriers == body)
+        members = np.flatnonzero(carrier == body)
         parts.mass[i] = mass = sum(m.mass[members].tolist())
         places = np.array([own[b][1] + product(own[b][0], m.center_of_mass[b]) for b in members])
         if len(members) > 1 and mass > 0.0:

@@ -22,6 +22,7 @@ from iapb.mechanics.bodies import Body
 from iapb.mechanics.joints import KINDS, Joint, Mimic, ranges_of
 from iapb.mechanics.mechanism import Mechanism
 from iapb.mechanics.rotations import rotation_of
+from iapb.mechanics.structure import carriers
 from iapb.numerics.linalg import product
 from iapb.numerics.schema import Booleans, Floats, Indices, Integers
 from iapb.scene.bodies import WORLD, inertia_matrix
@@ -182,12 +183,6 @@ def limits_of(scene: Scene) -> list[tuple[float, float] | None]:
     return [ranges.get(body.name) for body in scene.bodies]
 
 
-def _parents(scene: Scene) -> list[int]:
-    """Return the index of each body's parent, -1 for the world."""
-    index = {body.name: i for i, body in enumerate(scene.bodies)} | {WORLD: -1}
-    return [index[body.parent] for body in scene.bodies]
-
-
 def _owned_shapes(scene: Scene) -> list[tuple[int, Any, Any]]:
     """Return every shape after its body or wall and the body's index, -1 for walls."""
     of_bodies = [(i, body, shape) for i, body in enumerate(scene.bodies) for shape in body.shapes]
@@ -207,7 +202,7 @@ def shapes_of(scene: Scene) -> Shapes:
     """
     space = isinstance(scene, SpatialScene)
     n = 3 if space else 2
-    parents = _parents(scene)
+    index = {body.name: i for i, body in enumerate(scene.bodies)}
     made = []
     for body, _, shape in _owned_shapes(scene):
         rotation = np.eye(n)
@@ -217,7 +212,7 @@ def shapes_of(scene: Scene) -> Shapes:
             turn = _turn(scene.bodies[link])
             rotation = product(turn, rotation)
             shift = product(turn, shift) + scene.bodies[link].origin
-            link = parents[link]
+            link = index.get(scene.bodies[link].parent, -1)
         made.append(
             _placed(shape, -1, rotation, shift)
             if link < 0
@@ -253,37 +248,27 @@ def _placed(shape: Any, body: int, rotation: Floats, shift: Floats) -> geometry.
     return geometry.Shape(geometry.POLYGON, body, vertices=product(corners, turn.T) + center)
 
 
-def pairs_of(scene: Scene, shapes: Shapes) -> Pairs:
-    """Return the candidate pairs (k, 2) of the scene's shapes (`shapes_of`); the first shape is of
-    a moving body.
+def pairs_of(scene: Scene, mechanism: Mechanism, shapes: Shapes) -> tuple[Pairs, tuple[str, ...]]:
+    """Return the candidate pairs (k, 2) of the scene's shapes (`shapes_of`), and the scene's remarks
+    with one on links that never touch, since they overlap at the start.
 
-    Bodies of one tree are paired only with ``contact.self_collisions``. Rigidly connected bodies
-    and neighbours across one joint are never paired, because they touch by construction. Nor are
-    those that overlap at the start.
+    The first shape of a pair is of a moving body. Bodies of one tree are paired only with
+    ``contact.self_collisions``. Rigidly connected bodies and neighbours across one joint are never
+    paired, because they touch by construction. Nor are those that overlap at the start.
     """
-    return pairs_and_remarks(scene, shapes)[0]
-
-
-def pairs_and_remarks(scene: Scene, shapes: Shapes) -> tuple[Pairs, tuple[str, ...]]:
-    """Return the pairs of `pairs_of`, and the scene's remarks with one on links that never touch,
-    since they overlap at the start."""
-    tree: list[int] = []  # body -> first body of its tree
-    part: list[int] = []  # body -> first body of its rigid part
-    carrier: list[int] = []  # body -> rigid part that carries the joint of its own, -1 = the world
-    for i, (body, parent) in enumerate(zip(scene.bodies, _parents(scene), strict=True)):
-        welded = body.joint == "fixed" and parent >= 0
-        tree.append(tree[parent] if parent >= 0 else i)
-        part.append(part[parent] if welded else i)
-        carrier.append(carrier[parent] if welded else part[parent] if parent >= 0 else -1)
+    part = carriers(mechanism.arrays)
+    # the rigid part that carries the joint of its own; the world has none
+    beneath = np.append(part, -1)[mechanism.arrays.parent[part]]
+    beneath[part < 0] = -2
     pairs = candidate_pairs(shapes)
     bodies = np.array([body for body, _, _ in _owned_shapes(scene)], np.int64)[pairs.T]
-    (tree_a, tree_b), (part_a, part_b), (carrier_a, carrier_b) = np.array([tree, part, carrier])[
-        :, bodies
-    ]
-    adjoining = (part_a == part_b) | (carrier_a == part_b) | (carrier_b == part_a)
+    tree_a, tree_b = mechanism.tree_of_body[bodies]
+    part_a, part_b = part[bodies]
+    beneath_a, beneath_b = beneath[bodies]
+    adjoining = (part_a == part_b) | (beneath_a == part_b) | (beneath_b == part_a)
     apart = (bodies < 0).any(axis=0) | (tree_a != tree_b)
     links = ~apart & ~adjoining & scene.contact.self_collisions
-    overlapping = _overlapping_at_start(scene, shapes, pairs[links])
+    overlapping = _overlapping_at_start(scene, mechanism, shapes, pairs[links])
     owners = shape_names(scene)
     named = sorted({f"{owners[a]} and {owners[b]}" for a, b in pairs[links][overlapping]})
     links[links] = ~overlapping
@@ -291,11 +276,13 @@ def pairs_and_remarks(scene: Scene, shapes: Shapes) -> tuple[Pairs, tuple[str, .
     return pairs[apart | links], (*scene.remarks, *((said,) * bool(named)))
 
 
-def _overlapping_at_start(scene: Scene, shapes: Shapes, pairs: Pairs) -> Booleans:
+def _overlapping_at_start(
+    scene: Scene, mechanism: Mechanism, shapes: Shapes, pairs: Pairs
+) -> Booleans:
     """Return which of some pairs of shapes (k, 2) overlap in the pose of the start."""
     if not len(pairs):
         return np.zeros(0, np.bool_)
-    placed = mechanism_of(scene).placements(start_of(scene)[0])
+    placed = mechanism.placements(start_of(scene)[0])
     contacts = ContactFinder(shapes, pairs).find(*placed, -TOUCHING)
     found = set(zip(contacts.shape_a.tolist(), contacts.shape_b.tolist(), strict=True))
     return np.array([tuple(pair) in found for pair in pairs.tolist()])
@@ -319,34 +306,28 @@ def stops_of(scene: Scene, mechanism: Mechanism) -> Stops:
     axis, of all bodies that it carries, in the pose of the start. The effective mass at the stop is
     then their whole mass, and stiffness and damping act as at a contact.
     """
-    parents = _parents(scene)
-    carried = [body.mass for body in scene.bodies]
     arrays = mechanism.arrays
-    for i, parent in reversed(list(enumerate(parents))):
+    carried = np.array([body.mass for body in scene.bodies])
+    for i, parent in reversed([*enumerate(arrays.parent.tolist())]):
         if parent >= 0:
             carried[parent] += carried[i]
-    limits = limits_of(scene)
-    limited = [i for i, own in enumerate(limits) if own is not None]
-    inertia = np.diagonal(mechanism.mass_matrix(start_of(scene)[0])) if limited else np.zeros(0)
-    turned = [
-        float(inertia[arrays.v_start[i]]) if scene.bodies[i].joint == "revolute" else 0.0
-        for i in limited
-    ]
-    arms = [
-        math.sqrt(x / carried[i]) if x > 0.0 and carried[i] > 0.0 else 1.0
-        for i, x in zip(limited, turned, strict=True)
-    ]
-    body = np.repeat(np.array(limited, np.int64), 2)
-    bounds = [limits[i] or () for i in limited]
-    shape = len(_owned_shapes(scene)) + np.arange(len(body), dtype=np.int64)
+    limits = [(i, own) for i, own in enumerate(limits_of(scene)) if own is not None]
+    limited = np.array([i for i, _ in limits], np.int64)
+    arms = np.ones(len(limited))
+    inertia = np.diagonal(mechanism.mass_matrix(start_of(scene)[0])) if limits else np.zeros(0)
+    for k, i in enumerate(limited.tolist()):
+        turned = inertia[arrays.v_start[i]]
+        if scene.bodies[i].joint == "revolute" and turned > 0.0 and carried[i] > 0.0:
+            arms[k] = math.sqrt(turned / carried[i])
+    body = np.repeat(limited, 2)
     return Stops(
         body,
-        np.array(parents, np.int64)[body],
-        shape,
+        arrays.parent[body],
+        len(_owned_shapes(scene)) + np.arange(len(body)),
         arrays.q_start[body],
         arrays.v_start[body],
         np.tile([1.0, -1.0], len(limited)),
-        np.array(bounds, np.float64).ravel(),
+        np.array([own for _, own in limits], np.float64).ravel(),
         np.repeat(arms, 2),
     )
 

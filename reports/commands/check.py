@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from iapb.advice.checks import Caution, Start, check_scene, step_limits
-from iapb.scene.mechanism import pairs_and_remarks, shapes_of
+from iapb.system import system_of
 from iapb.worlds import find_world
 from reports.commands.run import DISTRUSTED, SceneName, Values, cost_in_words, scene_given
 from reports.show import Answer, Json
@@ -23,7 +23,7 @@ def check(
     """Warn of problems that would make a run of SCENE worthless, with values to set; end with 3
     then."""
     source = scene_given(scene, set_)
-    remarks = pairs_and_remarks(source, shapes_of(source))[1]
+    remarks = system_of(source).remarks
     found = find_world(world)
     law = found.law
     law = law.within(source) if hasattr(law, "within") else law

@@ -165,8 +165,8 @@ def describe(run: Run, existed: bool) -> Iterator[str]:
     if run.every > 1:
         yield f"Recorded are {run.steps} of them: one of {run.every}, and those with an impact."
     if len(impacts.step):
-        lost = sum(float(np.sum(block)) for block in blocks(impacts.energy_lost))
-        lost = round(lost, 15) + 0.0  # rounding errors are printed as 0
+        taken = (float(np.sum(block)) for block in blocks(impacts.energy_lost))
+        lost = round(sum(taken), 15) + 0.0  # a rounding error is printed as 0
         most = max(int(block.max()) for block in blocks(impacts.rows))
         yield (
             f"{counted(len(impacts.step), 'impact')}, the first at "

@@ -16,8 +16,8 @@ from iapb.numerics.elementary import sine_cosine
 from iapb.run import Run
 from iapb.scene import Scene, find_scene, load_scene, scene_from_text
 from iapb.scene.expressions import function_of
-from iapb.scene.mechanism import frictions_of, pairs_of, shapes_of
 from iapb.simulation import Simulation, simulate
+from iapb.system import System
 from tests.iapb.contact.paper import scene_of
 
 PEG = load_scene(find_scene("peg_corner"))
@@ -39,7 +39,8 @@ def test_of_two_values_the_geometric_mean_counts(
     scene = PEG.with_values(
         {"bodies.peg.friction": peg, "walls.floor.friction": floor, "contact.friction": general}
     )
-    found = frictions_of(scene).by_pair(pairs_of(scene, shapes_of(scene)))  # right wall, floor
+    system = System(scene)
+    found = system.frictions.by_pair(system.pairs)  # right wall, floor
     assert found == pytest.approx([general if peg is None else peg, expected], rel=1e-15)
 
 

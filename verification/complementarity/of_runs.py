@@ -20,12 +20,9 @@ from iapb.run import Run
 from iapb.scene import Scene, find_scene, load_scene
 from iapb.scene.mechanism import (
     mechanism_of,
-    pairs_of,
     restitution_by_pair,
-    restitutions_of,
-    shapes_of,
 )
-from iapb.system import System
+from iapb.system import System, system_of
 from reference.complementarity.problem import ImpactProblem
 from reference.contact_rows import unit_tangents
 from reference.worlds import run_world
@@ -49,7 +46,7 @@ def impacts_of_run(run: Run, scene: Scene) -> tuple[tuple[ImpactCase, ...], int]
     """
     mechanism = mechanism_of(scene)
     approach = scene.contact.approach_velocity
-    values = restitutions_of(scene, pairs_of(scene, shapes_of(scene)))
+    values = system_of(scene).restitutions
     rubbing = bool(run.law_settings.get("friction_in_impacts")) and scene.largest_friction > 0.0
     other_law = scene.contact.self_collision_rows == "per_body" or len(values) != 1 or rubbing
     cases = []

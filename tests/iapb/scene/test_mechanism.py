@@ -12,7 +12,8 @@ from iapb.contact.geometry import CIRCLE, HALF_PLANE, POLYGON
 from iapb.errors import SceneError
 from iapb.mechanics.mechanism import Mechanism
 from iapb.scene import Scene, load_scene, scene_from_text
-from iapb.scene.mechanism import mechanism_of, pairs_and_remarks, pairs_of, shapes_of, start_of
+from iapb.scene.mechanism import mechanism_of, shapes_of, start_of
+from iapb.system import System
 
 # A bracket on the world carries a chain of three links, the last with a welded tool; two pucks lie
 # free.
@@ -36,7 +37,7 @@ BRACKET, ONE, TWO, THREE, TOOL, PUCK, FLOOR = range(7)  # shapes, in this order
 
 
 def pairs(scene: Scene) -> set[frozenset[int]]:
-    return {frozenset(map(int, pair)) for pair in pairs_of(scene, shapes_of(scene))}
+    return {frozenset(map(int, pair)) for pair in System(scene).pairs}
 
 
 def test_q_and_v_are_the_positions_and_velocities_in_the_order_of_the_bodies() -> None:
@@ -98,13 +99,11 @@ def test_moving_shapes_meet_walls_and_other_trees_neighbours_never_meet() -> Non
         )
     }
     assert pairs(CHAIN) == others | own
-    (said,) = pairs_and_remarks(CHAIN, shapes_of(CHAIN))[1]
+    (said,) = System(CHAIN).remarks
     assert said.startswith("one and three overlap at the start")
     assert pairs(CHAIN.with_values({"contact.self_collisions": False})) == others
-    shapes = shapes_of(CHAIN)
-    assert (
-        shapes.body[pairs_of(CHAIN, shapes)[:, 0]] >= 0
-    ).all()  # the first shape of a pair moves
+    chain = System(CHAIN)
+    assert (chain.shapes.body[chain.pairs[:, 0]] >= 0).all()  # the first shape of a pair moves
 
 
 BODY = """name: thing
