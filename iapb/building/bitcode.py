@@ -13,6 +13,7 @@ from collections.abc import Callable
 from functools import cache, cached_property
 from itertools import accumulate
 from typing import Any
+from unittest.mock import patch
 
 from llvmlite import ir
 from numba import jit, typeof, types
@@ -29,6 +30,7 @@ from numba.extending import (
     register_model,
     typeof_impl,
 )
+from numba.np import arrayobj
 
 from iapb.numerics.compiled import Block, Kernel
 
@@ -107,6 +109,11 @@ class BitcodeLibrary(JITCodeLibrary):
         return list(found)
 
 
+def _plain_index(context: Any, builder: Any, kind: Any, index: Any, size: Any) -> Any:
+    """Return an index as it is: in a kernel none is negative, so none counts from the end."""
+    return context.cast(builder, index, kind, types.intp)
+
+
 @register_pass(mutates_CFG=True, analysis_only=False)
 class BitcodeLowering(NativeLowering):
     """Lower to bitcode; callers find the function by a key in place of its machine code."""
@@ -117,7 +124,8 @@ class BitcodeLowering(NativeLowering):
         """Run numba's own lowering into a library without machine code."""
         state.library = BitcodeLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         state.flags.no_compile = True
-        super().run_pass(state)
+        with patch.object(arrayobj, "fix_integer_index", _plain_index):
+            super().run_pass(state)
         state.library.finalize()
         key = object()
         state.targetctx.insert_user_function(key, state.cr.fndesc, state.library.needed)

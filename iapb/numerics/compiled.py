@@ -1,6 +1,7 @@
 """Run kernels from the engine's library, and pass nested tuples of arrays to them as one pointer.
 
-`kernel` marks a function as a kernel: it allocates nothing, and calls only kernels.
+`kernel` marks a function as a kernel: it allocates nothing, calls only kernels, and gives no index
+below zero.
 `iapb.building` compiles each kernel that Python calls, with all kernels that it needs, into one
 shared library when the package is built. A call from Python then runs the library's code. It is
 compiled for given kinds of arguments; for any others the kernel runs as Python, with the same bits.

@@ -35,24 +35,32 @@ def _multiply_add(c_hi, c_lo, a_hi, a_lo, b_hi, b_lo):
 
 
 @kernel
+def _tails(z):
+    """Return 1/9! − z/11! + … of the sine and 1/8! − z/10! + … of the cosine, z the square of the
+    angle."""
+    sine = 1.0 / 355687428096000.0 - z * (1.0 / 121645100408832000.0)  # 1/17! − z/19!
+    sine = 1.0 / 362880.0 - z * (
+        1.0 / 39916800.0 - z * (1.0 / 6227020800.0 - z * (1.0 / 1307674368000.0 - z * sine))
+    )
+    cosine = 1.0 / 20922789888000.0 - z * (1.0 / 6402373705728000.0)  # 1/16! − z/18!
+    cosine = 1.0 / 40320.0 - z * (
+        1.0 / 3628800.0 - z * (1.0 / 479001600.0 - z * (1.0 / 87178291200.0 - z * cosine))
+    )
+    return sine, cosine
+
+
+@kernel
 def _near_zero(h, l):
     """Return sine and cosine, as pairs, of an angle h + l of at most about 45 degrees."""
     z, w = two_product(h, h)
     w += 2.0 * h * l
-    tail = 1.0 / 355687428096000.0 - z * (1.0 / 121645100408832000.0)  # 1/17! − z/19!
-    tail = 1.0 / 362880.0 - z * (
-        1.0 / 39916800.0 - z * (1.0 / 6227020800.0 - z * (1.0 / 1307674368000.0 - z * tail))
-    )
-    s, t = add_product(-_SEVENTH[0], -_SEVENTH[1], z, w, tail)
+    sine_tail, cosine_tail = _tails(z)
+    s, t = add_product(-_SEVENTH[0], -_SEVENTH[1], z, w, sine_tail)
     s, t = _multiply_add(_FIFTH[0], _FIFTH[1], z, w, s, t)
     s, t = _multiply_add(-_THIRD[0], -_THIRD[1], z, w, s, t)
     s, t = _multiply_add(0.0, 0.0, z, w, s, t)
     s, t = _multiply_add(h, l, s, t, h, l)
-    tail = 1.0 / 20922789888000.0 - z * (1.0 / 6402373705728000.0)  # 1/16! − z/18!
-    tail = 1.0 / 40320.0 - z * (
-        1.0 / 3628800.0 - z * (1.0 / 479001600.0 - z * (1.0 / 87178291200.0 - z * tail))
-    )
-    c, d = add_product(-_SIXTH[0], -_SIXTH[1], z, w, tail)
+    c, d = add_product(-_SIXTH[0], -_SIXTH[1], z, w, cosine_tail)
     c, d = _multiply_add(_FOURTH[0], _FOURTH[1], z, w, c, d)
     c, d = _multiply_add(-0.5, 0.0, z, w, c, d)
     c, d = _multiply_add(1.0, 0.0, z, w, c, d)
@@ -60,8 +68,9 @@ def _near_zero(h, l):
 
 
 @kernel
-def _sine_cosine_pairs(angle):
-    """Return sine and cosine of an angle [rad] as pairs hi + lo."""
+def _reduced(angle):
+    """Return an angle [rad] less a whole number of quarter turns, as a pair hi + lo, and that
+    number."""
     if not abs(angle) <= _LARGEST_ANGLE:
         # the rounded 2π changes the angle by less than its own rounding error
         angle = math.copysign(abs(angle) % (4.0 * _QUARTER[0]), angle)
@@ -71,6 +80,13 @@ def _sine_cosine_pairs(angle):
     if turns != 0:
         for part in _QUARTER:
             h, l = add_product(h, l, part, 0.0, -float(turns))
+    return h, l, turns
+
+
+@kernel
+def _sine_cosine_pairs(angle):
+    """Return sine and cosine of an angle [rad] as pairs hi + lo."""
+    h, l, turns = _reduced(angle)
     s, t, c, d = _near_zero(h, l)
     if turns & 1:
         s, t, c, d = c, d, -s, -t
@@ -83,12 +99,52 @@ def _sine_cosine_pairs(angle):
 
 
 @kernel
+def _quickly(h, l):
+    """Return sine and cosine of an angle h + l of at most about 45 degrees, rounded, and whether the
+    error cannot have changed the rounding.
+
+    Sine h (1 + z (−1/6 + z/120 − …)) and cosine 1 + z (−1/2 + z/24 − …), z = h², have terms of
+    at most 0.005 and 0.001 that are not pairs: errors below 2^-59 z and 2^-61 z².
+    """
+    z, w = two_product(h, h)
+    w += 2.0 * h * l
+    sine_tail, cosine_tail = _tails(z)
+    a, b = two_sum(-_THIRD[0], z * (_FIFTH[0] - z * (_SEVENTH[0] - z * sine_tail)))
+    p, r = two_product(z, a)
+    r += w * a + z * (b - _THIRD[1])
+    m, e = two_product(h, p)
+    s, t = two_sum(h, m)
+    t += e + h * r + l * (1.0 + p)
+    a, b = two_sum(_FOURTH[0], -z * (_SIXTH[0] - z * cosine_tail))
+    p, r = two_product(z, a)
+    r += w * a + z * (b + _FOURTH[1])
+    a, b = two_sum(-0.5, p)
+    p, e = two_product(z, a)
+    e += w * a + z * (b + r)
+    c, d = two_sum(1.0, p)
+    d += e
+    sine_error = 2.0**-57 * z * abs(s)
+    cosine_error = 2.0**-59 * z * z
+    sine = s + (t + sine_error)
+    cosine = c + (d + cosine_error)
+    sure = sine == s + (t - sine_error) and cosine == c + (d - cosine_error)
+    return sine, cosine, sure
+
+
+@kernel
 def sine_cosine(angle):
     """Return (sin, cos) of an angle [rad]; NaN for an angle that is not finite."""
     if not math.isfinite(angle):
         return math.nan, math.nan
-    s, t, c, d = _sine_cosine_pairs(angle)
-    return s + t, c + d
+    h, l, turns = _reduced(angle)
+    s, c, sure = _quickly(h, l)
+    if not sure:
+        s, t, c, d = _near_zero(h, l)
+        s += t
+        c += d
+    if turns & 1:
+        s, c = c, -s
+    return (-s, -c) if turns & 2 else (s, c)
 
 
 @kernel

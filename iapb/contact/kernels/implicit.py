@@ -31,7 +31,7 @@ import math
 from typing import Annotated, NamedTuple
 
 from iapb.contact.kernels.contact_set import LEFT, TOUCHING, contact_before, group_of_contact
-from iapb.contact.kernels.rows import friction_of, tangent_of, twist, write_pair_row
+from iapb.contact.kernels.rows import friction_of, tangent_of, twist, write_pair_rows
 from iapb.numerics.compiled import kernel
 from iapb.numerics.linalg import (
     add,
@@ -82,6 +82,7 @@ class RestWork(NamedTuple):
     size: Annotated[
         Integers, "contact 2"
     ]  # number of coordinates of these; 0 = no tree, or the first one again
+    direction: Annotated[Floats, "row 3"]  # of each row: the normal, then the tangents
     rows: Annotated[Floats, "row width"]  # rows of J: one half for each of the two trees
     speed: Annotated[Floats, "row"]  # J v [m/s]
     p: Annotated[Floats, "row"]  # impulses of the step [N s]
@@ -260,10 +261,12 @@ def gather_contacts(world, state, group, s):
             for k in range(high, work.end[high]):
                 work.envelope[k] = min(work.envelope[k], work.offset[min(trees)])
         n = load(contacts.normal, i)
+        own = count * s
         for j in range(s):
-            direction = n if j == 0 else tangent_of(n, j - 1, s - 1)
-            write_pair_row(world, state, trees, i, direction, work.rows[count * s + j])
-            work.bend[count * s + j] = 0.0
+            store(work.direction, own + j, n if j == 0 else tangent_of(n, j - 1, s - 1))
+            work.bend[own + j] = 0.0
+        directions = work.direction[own : own + s]
+        write_pair_rows(world, state, trees, i, directions, work.rows[own : own + s])
         before = contact_before(state, i, begin)
         store(contacts.drift, i, (0.0, 0.0, 0.0))
         if before >= 0:
@@ -277,11 +280,11 @@ def gather_contacts(world, state, group, s):
             if force > 0.0 and abs(bend) > TOUCHING and span >= SHORT * world.dt:
                 if span < world.dt or state.h[0] < world.dt:  # it grows with the square of time
                     bend *= world.dt / span * (state.h[0] / span)
-                work.bend[count * s] = bend / world.dt
+                work.bend[own] = bend / world.dt
             if force > 0.0 and s > 1:
-                follow_arc(world, state, before, i, count * s, s)
+                follow_arc(world, state, before, i, own, s)
         if contacts.lift[i] > 0.0:
-            work.bend[count * s] = contacts.lift[i] / state.h[0]
+            work.bend[own] = contacts.lift[i] / state.h[0]
         count = count + 1
         i = work.next[i]
     return count
@@ -331,10 +334,8 @@ def follow_arc(world, state, before, i, row, s):
         store(state.contacts.drift, i, drift)
         aside = add(aside, drift)
     if dot(aside, aside) > ROUNDED * ROUNDED:
-        n = load(state.contacts.normal, i)
-        for j in range(1, s):
-            bend = dot(aside, tangent_of(n, j - 1, s - 1)) / world.dt
-            state.rest_work.bend[row + j] = bend
+        for j in range(row + 1, row + s):
+            state.rest_work.bend[j] = dot(aside, load(state.rest_work.direction, j)) / world.dt
 
 
 @kernel
@@ -425,15 +426,13 @@ def push(world, state, r, s, k, share):
 
 
 @kernel
-def slide_length(work, r, s, share):
-    """Return |w| at `share` of the present step, and the divisor of w that gives −p: max(|w|,
-    STICKING)/c."""
+def slide_speed(work, r, s, share):
+    """Return |w| at `share` of the present step, or STICKING where it is less."""
     square = 0.0
     for j in range(r * s + 1, (r + 1) * s):
         w = speed_at(work, j, share)
         square += w * w
-    size = math.sqrt(square)
-    return size, max(size, STICKING) / work.limit[r] if work.limit[r] > 0.0 else math.inf
+    return math.sqrt(square) if square > STICKING * STICKING else STICKING
 
 
 @kernel
@@ -444,9 +443,9 @@ def set_impulses(world, state, count, s, k, share):
         n = r * s
         work.p[n] = push(world, state, r, s, k, share)
         if s > 1:
-            _, divisor = slide_length(work, r, s, share)
+            grip = work.limit[r] / slide_speed(work, r, s, share)
             for j in range(n + 1, n + s):
-                work.p[j] = -speed_at(work, j, share) / divisor
+                work.p[j] = -grip * speed_at(work, j, share)
 
 
 @kernel
@@ -511,19 +510,37 @@ def free_energy(world, state, size):
 
 
 @kernel
-def add_square(work, matrix, r, one, other, factor):
-    """Add factor · J_oneᵀ J_other of contact r to the lower triangle of the Newton matrix."""
+def add_squares(work, matrix, r, s, push_back, grip, slip):
+    """Add −Jᵀ (∂p/∂γ) J of contact r to the lower triangle of the Newton matrix: −∂p/∂γ is
+    `push_back` along the normal and, along the tangents, grip (1 − w wᵀ/|w|²) where it slips."""
     half = work.rows.shape[1] // 2
+    n = r * s
+    first = n + min(1, s - 1)
+    last = n + s - 1
+    along = across = 0.0
+    if slip > STICKING:
+        along = speed_at(work, first, 0.0) / slip
+        across = speed_at(work, last, 0.0) / slip if s > 2 else 0.0
+    one = grip * (1.0 - along * along)
+    both = -grip * along * across
+    two = grip * (1.0 - across * across) if s > 2 else 0.0
+    normal = work.rows[n]
+    tangent = work.rows[first]
+    other = work.rows[last]
     for side in range(2):
         for i in range(work.size[r, side]):
+            at = side * half + i
+            a = push_back * normal[at]
+            b = one * tangent[at] + both * other[at]
+            c = both * tangent[at] + two * other[at]
             row = work.at[r, side] + i
-            left = factor * work.rows[one, side * half + i]
-            if left == 0.0:
-                continue
             for second in range(2):
                 to = work.at[r, second]
+                start = second * half
                 for j in range(min(work.size[r, second], row + 1 - to)):
-                    matrix[row, to + j] += left * work.rows[other, second * half + j]
+                    matrix[row, to + j] += (
+                        a * normal[start + j] + b * tangent[start + j] + c * other[start + j]
+                    )
 
 
 @kernel
@@ -544,17 +561,14 @@ def newton_matrix(world, state, size, count, s, k):
             matrix[i, i] += work.dry[i] / STICKING
     for r in range(count):
         n = r * s
-        if work.p[n] > 0.0:
-            add_square(work, matrix, r, n, n, state.h[0] * k)
-        slip, divisor = slide_length(work, r, s, 0.0)
-        for j in range(n + 1, n + s):
-            for h in range(n + 1, n + s):
-                factor = 1.0 / divisor if j == h else 0.0
-                if slip > STICKING:
-                    along = speed_at(work, j, 0.0) / slip
-                    factor -= along * (speed_at(work, h, 0.0) / slip) / divisor
-                if factor != 0.0:
-                    add_square(work, matrix, r, j, h, factor)
+        push_back = state.h[0] * k if work.p[n] > 0.0 else 0.0
+        grip = 0.0
+        slip = STICKING
+        if s > 1:
+            slip = slide_speed(work, r, s, 0.0)
+            grip = work.limit[r] / slip
+        if push_back > 0.0 or grip > 0.0:
+            add_squares(work, matrix, r, s, push_back, grip, slip)
 
 
 @kernel
@@ -645,7 +659,7 @@ def is_quadratic(world, state, size, count, s, k):
             return False
         if (
             work.limit[r] > 0.0
-            and max(slide_length(work, r, s, 0.0)[0], slide_length(work, r, s, 1.0)[0]) > STICKING
+            and max(slide_speed(work, r, s, 0.0), slide_speed(work, r, s, 1.0)) > STICKING
         ):
             return False
     return True
@@ -747,9 +761,9 @@ def remember_points(world, state, r, s):
     _, _, omega_a = twist(world.mechanism, state.body, contacts.body_a[i], state.v)
     _, _, omega_b = twist(world.mechanism, state.body, contacts.body_b[i], state.v)
     store(contacts.rolled, i, scale(state.h[0], cross(subtract(omega_a, omega_b), n)))
-    slid = scale(state.h[0] * work.speed[r * s], n)
-    for j in range(1, s):
-        slid = add(slid, scale(state.h[0] * work.speed[r * s + j], tangent_of(n, j - 1, s - 1)))
+    slid = (0.0, 0.0, 0.0)
+    for j in range(r * s, (r + 1) * s):
+        slid = add(slid, scale(state.h[0] * work.speed[j], load(work.direction, j)))
     store(contacts.slid, i, slid)
 
 
@@ -773,19 +787,18 @@ def give_back(world, state, size, count, s):
         contacts.span[i] = state.h[0]
         contacts.expected[i] = contacts.gap[i] + state.h[0] * work.speed[r * s]
         add_along_row(work, r, r * s, contacts.normal_force[i], pushed)
-        n = load(contacts.normal, i)
         contacts.sticks[i] = (
             s > 1
             and contacts.normal_force[i] > 0.0
-            and slide_length(work, r, s, 0.0)[0] <= 10.0 * STICKING
+            and slide_speed(work, r, s, 0.0) <= 10.0 * STICKING
         )
         if s > 1 and contacts.normal_force[i] > 0.0:
             remember_points(world, state, r, s)
         if s > 1 and work.limit[r] > 0.0:
-            for j in range(1, s):
-                size_of_force = work.p[r * s + j] / state.h[0]
-                force = add(force, scale(size_of_force, tangent_of(n, j - 1, s - 1)))
-                add_along_row(work, r, r * s + j, size_of_force, rubbed)
+            for j in range(r * s + 1, (r + 1) * s):
+                size_of_force = work.p[j] / state.h[0]
+                force = add(force, scale(size_of_force, load(work.direction, j)))
+                add_along_row(work, r, j, size_of_force, rubbed)
             store(contacts.friction_force, i, force)
     for i in range(size):
         k = work.dof[i]

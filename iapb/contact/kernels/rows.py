@@ -20,6 +20,18 @@ ROW_NOISE = 1e-13
 
 
 @kernel
+def motion_and_size(m, w, k, x):
+    """Return the motion of the world point x per unit rate of dof k, and the square of the numbers
+    that it was computed from."""
+    a = load(w.axis, k)
+    if not m.dof_rotates[k]:
+        return a, 1.0
+    o = load(w.position, m.dof_body[k])
+    j = cross(a, subtract(x, o))
+    return j, dot(j, j) + dot(x, x) + dot(o, o)
+
+
+@kernel
 def add_body_row(m, w, body, x, n, factor, out, shift=0):
     """out[shift + k] += factor · nᵀJ of the body at the world point x, k < d; the static world (-1)
     adds nothing.
@@ -34,13 +46,8 @@ def add_body_row(m, w, body, x, n, factor, out, shift=0):
         return
     k = m.last_dof[body]
     while k >= 0:
-        j = load(w.axis, k)
-        square = 1.0
-        if m.dof_rotates[k]:
-            o = load(w.position, m.dof_body[k])
-            j = cross(j, subtract(x, o))
-            square = dot(j, j) + dot(x, x) + dot(o, o)
-        entry = dot(n, j)
+        motion, square = motion_and_size(m, w, k, x)
+        entry = dot(n, motion)
         if not entry * entry <= ROW_NOISE * ROW_NOISE * square:  # NaN is no noise
             out[shift + m.dof_leader[k]] += m.dof_ratio[k] * factor * entry
         k = m.dof_parent[k]
@@ -64,10 +71,12 @@ def direction_row(m, w, contacts, i, direction, out):
 
 
 @kernel
-def write_pair_row(world, state, trees, i, direction, out):
-    """Write the row along a direction at contact i to out (2 w,): w entries for each of its two
-    trees (−1 = none)."""
-    half = out.shape[0] // 2
+def write_pair_rows(world, state, trees, i, directions, out):
+    """Write the rows of contact i along s directions (s, 3) to out (s, 2 w): w entries for each of
+    its two trees (−1 = none)."""
+    m = world.mechanism
+    w = state.body
+    half = out.shape[1] // 2
     x = load(state.contacts.point, i)
     factor = 1.0
     out[:] = 0.0
@@ -75,7 +84,14 @@ def write_pair_row(world, state, trees, i, direction, out):
         if body >= 0:
             tree = world.tree_of_body[body]
             shift = (half if tree == trees[1] else 0) - world.tree_start[tree]
-            add_body_row(world.mechanism, state.body, body, x, direction, factor, out, shift)
+            k = m.last_dof[body]
+            while k >= 0:
+                motion, square = motion_and_size(m, w, k, x)
+                for j in range(directions.shape[0]):
+                    entry = dot(load(directions, j), motion)
+                    if not entry * entry <= ROW_NOISE * ROW_NOISE * square:
+                        out[j, shift + m.dof_leader[k]] += m.dof_ratio[k] * factor * entry
+                k = m.dof_parent[k]
         factor = -1.0
 
 
