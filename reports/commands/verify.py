@@ -32,7 +32,9 @@ def verify(
         list[str] | None,
         typer.Option(help="Only these laws, by name: kinetic_energy,pushing; may be repeated."),
     ] = None,
-    impacts: Annotated[int, typer.Option(min=1, help="Random impacts.")] = IMPACTS,
+    impacts: Annotated[
+        int, typer.Option(min=1, help="Random impacts; 200 give a first answer in seconds.")
+    ] = IMPACTS,
     seed: Annotated[
         int, typer.Option(min=0, max=2**63 - 1, help="Seed of the random impacts.")
     ] = 0,

@@ -314,6 +314,8 @@ def opened(
             else "no such file"
         )
         raise RunFileError(f"{path}: {what}")
+    if path.suffix in (".yaml", ".yml"):
+        raise RunFileError(f"{path}: a scene, not a run; `iapb run {path}` makes a run of it")
     try:
         if not changed:
             _check_seal(path)
