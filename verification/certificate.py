@@ -172,8 +172,11 @@ def _finite(name: str, values: ArrayLike) -> Floats:
         raise ArgumentError(name, values, "an array of real numbers")
     with np.errstate(over="ignore"):
         array = np.ascontiguousarray(given, np.float64)
-    if not np.isfinite(array).all() or (given.dtype == np.longdouble and (array != given).any()):
-        raise ArgumentError(name, "a number that is no finite double", "finite numbers")
+    for place in np.argwhere(~(np.isfinite(array) & (array == given)))[:1]:
+        where = f"{name}[{', '.join(map(str, place))}]" if len(place) else name
+        raise ArgumentError(
+            where, float(given[tuple(place)]), "a finite number that a double holds"
+        )
     return array
 
 
