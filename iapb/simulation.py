@@ -12,7 +12,6 @@ step.
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Callable
 from contextlib import suppress
@@ -84,21 +83,16 @@ class Simulation:
         device: Device | None = None,
     ) -> None:
         self.law: Any = ImpulseAugmented() if law is None else law
-        if isinstance(law, type) or not all(
-            hasattr(self.law, name) for name in ("name", "settings", "advance")
-        ):
-            raise ArgumentError(
-                "law",
-                law,
-                "a contact law: an object with name, settings and advance(...); "
-                "the name of a world is given as world=...",
-            )
+        parts = ("name", "settings", "advance")
+        if isinstance(law, type) or not all(hasattr(self.law, part) for part in parts):
+            expected = "a contact law: an object with name, settings and advance(...); "
+            raise ArgumentError("law", law, f"{expected}the name of a world is given as world=...")
         self.coupling: Coupling = NoCoupling() if coupling is None else coupling
         if not isinstance(self.coupling, Coupling):
-            raise ArgumentError(
-                "coupling", coupling, "a NoCoupling(), FourChannel(...) or UnilateralCoupler(...)"
-            )
-        scene = scene if isinstance(scene, Scene | System) else load_scene(find_scene(scene))
+            expected = "a NoCoupling(), FourChannel(...) or UnilateralCoupler(...)"
+            raise ArgumentError("coupling", coupling, expected)
+        if not isinstance(scene, Scene | System):
+            scene = load_scene(find_scene(scene))
         self.system = scene if isinstance(scene, System) else System(scene)
         self.scene = self.system.scene
         if isinstance(self.law, ImpulseAugmented | Penalty):
@@ -107,15 +101,14 @@ class Simulation:
         # else a subclass overrides it
         self.compiled = getattr(type(self.law), "advance", None) is Penalty.advance
         self.effects = self.system.decide(self.law, self.coupling)
-        self.world = self.system.world_under(
-            *(self.law, self.effects) if self.compiled else (Penalty(),)
-        )
+        chosen = (self.law, self.effects) if self.compiled else (Penalty(),)
+        self.world = self.system.world_under(*chosen)
         self.port = self.system.make_port(self.coupling, self.effects, external=device is not None)
         if not isinstance(self.coupling, NoCoupling):
             self.state.cut.whole[:] = self.system.tool_tree
-        self.link = (
-            None if device is None else DeviceLink(device, self.world, self.state, self.port)
-        )
+        self.link = None
+        if device is not None:
+            self.link = DeviceLink(device, self.world, self.state, self.port)
         self._planned = self.scene.hand is not None and self.scene.hand.changes
         self.steps_done = 0
         self._first: list[np.ndarray] | None = None  # of `_rewind`
@@ -149,7 +142,7 @@ class Simulation:
 
     def _step(self) -> None:
         if self._planned:
-            self.port.wrench[:] = wrench_of(self.scene, (self.steps_done + 0.5) * self.system.dt)
+            self.port.wrench[:] = self._wrench_at(self.steps_done)
         moved = MOVE if self.link is None else 0
         if self.compiled:
             self._do(COUPLE | ADVANCE | RENDER | moved)
@@ -233,23 +226,22 @@ class Simulation:
             raise ArgumentError(f"{law} result", result, "a StepResult")
         if result.state not in (FREE, COLLIDING, RESTING):
             raise ArgumentError(f"{law} state", result.state, "FREE, COLLIDING or RESTING")
-        logged = state.impacts.logged
-        for what, count, most in (
-            ("contact_count[0]", state.contact_count[0], len(state.contacts.gap)),
-            ("impacts.logged[0]", logged[0], len(state.impacts.rows)),
-        ):
-            if not 0 <= count <= most:
-                state.contact_count[0] = logged[0] = 0
-                raise ArgumentError(
-                    f"{law} {what}", int(count), f"a count from 0 to {most}, the size of its buffer"
-                )
-        vectors = {name: np.asarray(getattr(result, name)) for name in _STEP_VECTORS}
-        for name, values in vectors.items():
+        contacts = state.contact_count, len(state.contacts.gap)
+        for what, (count, most) in {
+            "contact_count[0]": contacts,
+            "impacts.logged[0]": (state.impacts.logged, len(state.impacts.rows)),
+        }.items():
+            given = int(count[0])
+            if not 0 <= given <= most:
+                state.contact_count[0] = state.impacts.logged[0] = 0
+                expected = f"a count from 0 to {most}, the size of its buffer"
+                raise ArgumentError(f"{law} {what}", given, expected)
+        for name in _STEP_VECTORS:
+            values = np.asarray(getattr(result, name))
             target = getattr(state, name)
             if values.shape != target.shape or not np.isfinite(values).all():
                 raise ArgumentError(f"{law} {name}", values, f"{len(target)} finite numbers")
-        for name, values in vectors.items():
-            getattr(state, name)[:] = values
+            target[:] = values
         tool = self.system.tool_tree
         state.state_of_tree[tool if tool >= 0 else slice(None)] = result.state
 
@@ -278,12 +270,14 @@ class Simulation:
         self.port.planned[:steps] = self.port.wrench
         for k in range(steps if self._planned else 0):
             try:
-                self.port.planned[k] = wrench_of(
-                    self.scene, (self.steps_done + k + 0.5) * self.system.dt
-                )
+                self.port.planned[k] = self._wrench_at(self.steps_done + k)
             except IapbError as stop:
                 return k, stop
         return steps, None
+
+    def _wrench_at(self, step: int) -> Floats:
+        """Return force and torque of the scene's hand in the middle of a step."""
+        return wrench_of(self.scene, (step + 0.5) * self.system.dt)
 
 
 def simulate(
@@ -329,22 +323,14 @@ def simulate(
     IapbError, KeyboardInterrupt
         The run stopped before its first step was done, so there is nothing to return.
     """
+    is_limit = max_memory is None or _is_positive(max_memory, Real)
+    counts = "a function of the steps done and the total"
     for name, value, fine, expected in (
         ("world", world, isinstance(world, str), "the name of a world, as text"),
         ("steps", steps, steps is None or _is_positive(steps, Integral), "a whole number >= 1"),
         ("every", every, _is_positive(every, Integral), "a whole number >= 1"),
-        (
-            "progress",
-            progress,
-            progress is None or callable(progress),
-            "a function of the steps done and the total",
-        ),
-        (
-            "max_memory",
-            max_memory,
-            max_memory is None or _is_positive(max_memory, Real),
-            "a number of bytes > 0; math.inf for no limit",
-        ),
+        ("progress", progress, progress is None or callable(progress), counts),
+        ("max_memory", max_memory, is_limit, "a number of bytes > 0; math.inf for no limit"),
     ):
         if not fine:
             raise ArgumentError(name, value, expected)
@@ -360,9 +346,9 @@ def simulate(
             raise ArgumentError("every", every, f"1: {law.name} records every step")
         started = perf_counter()
         run = law.run(scene, steps, progress)
-        seconds = (
-            run.chunk_seconds if run.chunk_seconds.any() else np.array([perf_counter() - started])
-        )
+        seconds = run.chunk_seconds
+        if not seconds.any():
+            seconds = np.array([perf_counter() - started])
         return replace(run, world=world or law.name, chunk_seconds=seconds)
     contact_law: Any = law
     simulation = Simulation(system_of(scene), contact_law, coupling)
@@ -431,18 +417,11 @@ def _check_memory(each: int, steps: int, every: int, most: float | None) -> None
         raise ArgumentError(
             "steps",
             steps,
-            f"at most {int(most / each) * every:,}: the record takes {each} bytes a "
-            f"step and more with contacts, {_bytes(size)} in all, of {_bytes(most)} that it may "
-            f"take. "
+            f"at most {int(most / each) * every:,}: the record takes {each} bytes a step and more "
+            f"with contacts, {min(size, 1e300) / 1e9:.3g} GB in all, of {most / 1e9:.3g} GB that it may take. "
             f"every={fits} (iapb run --every {fits}) keeps one step of {fits} and fits; "
             "max_memory=math.inf takes the limit away",
         )
-
-
-def _bytes(count: float) -> str:
-    count = min(count, 1e300)  # a whole number may have any size
-    power = min(int(math.log10(max(count, 1.0)) // 3), 6)
-    return f"{count / 1e3**power:.3g} {('bytes', 'kB', 'MB', 'GB', 'TB', 'PB', 'EB')[power]}"
 
 
 def require_complete(run: Run) -> Run:

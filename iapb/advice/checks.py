@@ -196,12 +196,9 @@ class Start:
         return a - b
 
     def slips(self, i: int) -> Floats:
-        """Jacobian rows of contact i across its normal: one in the plane, two in space."""
-        n = self.found.normal[i]
-        across = (
-            geometry.frame_along(n)[:, :2].T if self.spatial else np.array([[-n[1], n[0], 0.0]])
-        )
-        return self.rows_along(np.full(len(across), i), across)
+        """Jacobian rows (2, d) of contact i across its normal; in the plane one of them is zero."""
+        across = geometry.frame_along(self.found.normal[i])[:, :2].T
+        return self.rows_along(np.full(2, i), across)
 
     @cached_property
     def blocks(self) -> list[tuple[slice, Floats]]:
