@@ -57,12 +57,8 @@ class Recorder:
         port = simulation.port
         state = simulation.state
         system = simulation.system
-        self.start = {
-            "q": state.q.copy(),
-            "v": state.v.copy(),
-            "device_q": port.device_q.copy(),
-            "device_v": port.device_v.copy(),
-        }
+        states: dict[str, Any] = port.members | state.members
+        self.start = {each.name: states[each.name].copy() for each in STATES}
         self.coordinates = len(state.q), len(state.v), len(port.device_q), len(port.device_v)
         self.shape = self.coordinates, system.capacity, system.most_impacts
         self._line_bytes = sum(array.nbytes for array in make_record(1, *self.shape).arrays()[1:])
@@ -86,12 +82,10 @@ class Recorder:
         if self._thinned and (self.steps - self.first) * self._line_bytes > _PIECE:
             self._thin(self._thinned, "", "", last=False)
         left = total - self.steps
-        size = chunk_steps(
-            self.simulation.system.capacity, left if most is None else min(left, most)
-        )
+        size = chunk_steps(self.simulation.system.capacity, min(left, most or left))
         if not self.records or len(self.records[-1].steps.q) < self.records[-1].used[0] + size:
             room = int(_ROOM / max(1, self._line_bytes))
-            self.records.append(make_record(max(size, min(total - self.steps, room)), *self.shape))
+            self.records.append(make_record(max(size, min(left, room)), *self.shape))
         started = time.perf_counter()
         done, stop = self.simulation.advance_chunk(self.records[-1], size)
         self.timings.append((done, time.perf_counter() - started))
@@ -121,19 +115,14 @@ class Recorder:
         """Return copies of the columns of `steps`, `contacts` or `impacts` over all records; states
         from the start."""
         number = list(LINES).index(lines)
-        first = self.start if lines == "steps" else {}
-        return {
-            each.name: np.concatenate(
-                [
-                    *([first[each.name][None]] if each.name in first else []),
-                    *(
-                        getattr(getattr(record, lines), each.name)[: record.used[number]]
-                        for record in self.records
-                    ),
-                ]
-            )
-            for each in LINES[lines]
-        }
+        found = {}
+        for each in LINES[lines]:
+            first = [self.start[each.name][None]] if each in STATES else []
+            blocks = [getattr(getattr(record, lines), each.name) for record in self.records]
+            used = [record.used[number] for record in self.records]
+            kept = [block[:count] for block, count in zip(blocks, used, strict=True)]
+            found[each.name] = np.concatenate(first + kept)
+        return found
 
     def _held(self, world: str, stopped: str) -> Run:
         """Return the steps held as a Run."""
@@ -145,7 +134,7 @@ class Recorder:
         mechanism = system.mechanism
         steps = self.joined("steps")
         impacts = self.joined("impacts")
-        offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(steps.pop("contact_count"))])
+        offsets = np.append(0, np.cumsum(steps.pop("contact_count")))
         if not simulation.compiled:  # a law written in Python logs no configuration
             impacts["q"] = steps["q"][impacts["step"] - self.first]
         impacts["time"] += impacts["step"] * system.dt
@@ -208,17 +197,11 @@ class Recorder:
 def _mass_digests(system: Any, places: Floats) -> NDArray[np.int64]:
     """Return the digest of M at each of n configurations (n, nq), a few at a time: all of them may
     take gigabytes."""
-    mechanism, start = system.mechanism, system.start[0]
+    mechanism = system.mechanism
     few = max(1, _BATCH // max(1, 8 * mechanism.nv**2))
-    return np.concatenate(
-        [
-            np.zeros(0, np.int64),
-            *(
-                digests(mechanism.mass_matrices_of_run(start, places[k : k + few]))
-                for k in range(0, len(places), few)
-            ),
-        ]
-    )
+    parts = [places[k : k + few] for k in range(0, max(1, len(places)), few)]
+    start = system.start[0]
+    return np.concatenate([digests(mechanism.mass_matrices_of_run(start, part)) for part in parts])
 
 
 def _shown(ledger: dict[str, Floats], run: Run) -> dict[str, Floats]:

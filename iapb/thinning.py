@@ -52,18 +52,17 @@ class Thinned:
         """
         struck = piece.impacts.step - first
         steps = np.union1d(np.arange(-first % self.every, piece.steps, self.every), struck)
-        columns = dict(_kept(piece, steps, before, last))
-        columns["impacts/step"] = self.rows + np.searchsorted(steps, struck)
-        distrust = self.distrust or piece.distrust
-        for name, values in columns.items():
+        for name, values in _kept(piece, steps, before, last):
             self._columns.setdefault(name, []).append(values)
+        impact_steps = self.rows + np.searchsorted(steps, struck)
+        self._columns.setdefault("impacts/step", []).append(impact_steps)
         self.rows += len(steps)
-        self.distrust = distrust
+        self.distrust = self.distrust or piece.distrust
 
     def run(self, piece: Run) -> Run:
         """Return the thinned run; `piece` is the last one, with all that is no array."""
         found = {name: np.concatenate(pieces) for name, pieces in self._columns.items()}
-        offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(found["contacts/count"])])
+        offsets = np.append(0, np.cumsum(found["contacts/count"]))
         arrays: dict[str, Any] = {name: found[name] for name in (*_STATES, *_STEPS)}
         contacts = {name: found[f"contacts/{name}"] for name in _CONTACTS}
         impacts = {name: found[f"impacts/{name}"] for name in _IMPACTS}
@@ -97,7 +96,8 @@ def _kept(
     for name in _CONTACTS:
         yield f"contacts/{name}", getattr(piece.contacts, name)[touching]
     for name in _IMPACTS:
-        yield f"impacts/{name}", getattr(piece.impacts, name)
+        if name != "step":
+            yield f"impacts/{name}", getattr(piece.impacts, name)
     for name, values in piece.energy.items():
         at_instants = values
         if len(values) == piece.steps:

@@ -3,6 +3,7 @@ passed through."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -31,28 +32,26 @@ class Solid(NamedTuple):
         """Return shape number i of a scene, which must not be endless."""
         body = int(shapes.body[i])
         radius = float(shapes.radius[i])
-        none = np.zeros(0)
-        corners = np.pad(
-            shapes.vertices[shapes.first[i] : shapes.first[i] + shapes.count[i]], ((0, 0), (0, 1))
-        )
+        rows = slice(shapes.first[i], shapes.first[i] + shapes.count[i])
+        corners = np.pad(shapes.vertices[rows], ((0, 0), (0, 1)))
         centre = corners.mean(axis=0) if len(corners) else shapes.center[i]
         middle = centre if body < 0 else np.zeros(3)
         if radius > 0.0:
             far = radius + float(np.linalg.norm(centre - middle))
-            return cls(body, centre[None], none.reshape(0, 3), none, radius, 2.0 * radius, far)
+            flat = np.zeros((0, 3))
+            return cls(body, centre[None], flat, flat[:, 0], radius, 2.0 * radius, far)
         if len(corners):
             edges = np.roll(corners, -1, axis=0) - corners
             normals = np.cross(edges, [0.0, 0.0, 1.0]) / np.linalg.norm(edges, axis=1)[:, None]
         else:
-            signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+            signs = np.array([*itertools.product((-1, 1), repeat=3)])
             corners = centre + (signs * shapes.half_size[i]) @ shapes.axes[i].T
             normals = np.vstack([shapes.axes[i].T, -shapes.axes[i].T])
         points = np.vstack([centre, corners])
         over = points @ normals.T
         far = float(np.linalg.norm(points - middle, axis=1).max())
-        return cls(
-            body, points, normals, over.max(axis=0), 0.0, float(np.ptp(over, axis=0).min()), far
-        )
+        thin = float(np.ptp(over, axis=0).min())
+        return cls(body, points, normals, over.max(axis=0), 0.0, thin, far)
 
     def height(self, points: Floats) -> Floats:
         """Return a height (n,) of points (n, 2 or 3) over the surface: zero on it, negative
@@ -72,29 +71,26 @@ class Solid(NamedTuple):
         """
         arc = arc + GRAZED * self.thin
         if self.radius > 0.0:
-            core = (
-                max(self.radius, radius) + GRAZED * self.thin if radius > 0.0 else self.radius
-            ) - arc
+            core = self.radius - arc
+            if radius > 0.0:
+                core = max(self.radius, radius) + GRAZED * self.thin - arc
             start = before - self.points[0]
             end = after - self.points[0]
             way = after - before
-            share = np.clip(
-                -(start * way).sum(axis=-1) / np.maximum((way * way).sum(axis=-1), 1e-300), 0.0, 1.0
-            )
-            first, last, least = (
-                np.linalg.norm(x, axis=-1) for x in (start, end, start + share[..., None] * way)
-            )
+            square = np.maximum((way * way).sum(axis=-1), 1e-300)
+            share = np.clip(-(start * way).sum(axis=-1) / square, 0.0, 1.0)
+            nearest = start + share[..., None] * way
+            first, last, least = (np.linalg.norm(x, axis=-1) for x in (start, end, nearest))
             return np.asarray((least < core) & (first >= core) & (last >= core))
-        before, after = (
-            at @ self.normals.T - self.offsets + arc[..., None] for at in (before, after)
-        )
+        before, after = (at @ self.normals.T - self.offsets for at in (before, after))
+        before += arc[..., None]
+        after += arc[..., None]
         share = before / np.where(before == after, 1.0, before - after)
         enters = np.where((before > 0.0) & (after <= 0.0), share, 0.0).max(axis=-1)
         leaves = np.where((before <= 0.0) & (after > 0.0), share, 1.0).min(axis=-1)
+        stays_out = ((before > 0.0) & (after > 0.0)).any(axis=-1)
         outside = (before.max(axis=-1) > 0.0) & (after.max(axis=-1) > 0.0)
-        return np.asarray(
-            outside & ~((before > 0.0) & (after > 0.0)).any(axis=-1) & (leaves > enters)
-        )
+        return np.asarray(outside & ~stays_out & (leaves > enters))
 
 
 def solids_of(shapes: Shapes) -> dict[int, Solid]:

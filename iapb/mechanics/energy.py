@@ -23,7 +23,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from iapb.errors import ArgumentError
 from iapb.mechanics.kernels.evaluation import impact_loss
 from iapb.mechanics.mechanism import Mechanism
 from iapb.numerics.compiled import Entry
@@ -103,19 +102,11 @@ def energy_ledger(
     dict
         `kinetic`, `potential` (n + 1,) [J]; `<name>_work` of each force, `impact_loss` and
         `integration_residual` (n,) [J], sums from the start to the end of each step.
-
-    Raises
-    ------
-    ArgumentError
-        Shapes of arrays that do not agree.
     """
     q, v, forces, impulse, straight, lost = steps
     kinetic, potential = mechanism.energies(q, v, gravity)
     displacement = mechanism.displacements(q, straight)
     before = before or {}
-    for name, force in {**forces, "impulse": impulse}.items():
-        if np.shape(force) != displacement.shape:
-            raise ArgumentError(f"{name} of shape", np.shape(force), str(displacement.shape))
     ledger = {"kinetic": kinetic, "potential": potential}
     for name, force in forces.items():
         ledger[f"{name}_work"] = port_energy(force, displacement, before.get(f"{name}_work", -0.0))

@@ -195,7 +195,7 @@ def test_a_scene_has_a_name_and_a_world_selects_the_law_and_its_coupling():
 def test_a_record_that_would_not_fit_is_refused_with_its_size_before_it_is_allocated():
     with pytest.raises(ArgumentError, match=r"bytes a step.*GB in all.*max_memory"):
         simulate("peg_corner", steps=10**12)
-    with pytest.raises(ArgumentError, match="EB in all"):
+    with pytest.raises(ArgumentError, match="GB in all"):
         simulate("peg_corner", steps=10**400)
     each = recording.Recorder(Simulation("peg_corner")).bytes_per_step
     assert simulate("peg_corner", steps=10, max_memory=10 * each).steps == 10
