@@ -20,7 +20,6 @@ from iapb.contact import laws
 from iapb.scene import Scene
 from iapb.scene.model import Device
 
-COUPLING_FIELDS = {"four-channel": "four_channel", "unilateral": "unilateral"}
 TURNING_JOINTS = ("revolute", "continuous", "planar", "spherical", "free_flyer")
 _POSES = 4  # number of poses at which gravity is evaluated
 
@@ -43,15 +42,18 @@ class Effect:
 
 @dataclass(frozen=True)
 class Question:
-    """A scene and the caller's law, coupling and rendering. None means not chosen yet: only the
-    scene decides."""
+    """A scene and the caller's law and coupling. None means not chosen yet: only the scene
+    decides."""
 
     system: Any  # the scene's `iapb.system.System`
-    law: str | None
+    law: Any
     uses: frozenset[str]  # parts of the contact section that the law uses
-    coupling: str | None
-    own_gains: Any  # of a coupling object of the caller; None: the scene's gains
-    rendering: str | None
+    coupling: Any
+
+    @property
+    def rendering(self) -> str | None:
+        """How the law respects the device's limits; None without a law."""
+        return self.law and getattr(self.law, "rendering", "full")
 
     @property
     def scene(self) -> Scene:
@@ -104,9 +106,7 @@ class Question:
         """Gains of the chosen coupling, or of any coupling if none is chosen; None if there are no
         gains."""
         couplings = self.scene.couplings
-        if self.own_gains is not None or self.coupling is None:
-            return self.own_gains or couplings.four_channel or couplings.unilateral
-        return getattr(couplings, COUPLING_FIELDS.get(self.coupling, "four_channel"))
+        return self.coupling or couplings.four_channel or couplings.unilateral
 
     def no_contact(self) -> str:
         """Return why nothing can touch; empty if shapes, or joints with limits that the law keeps,
@@ -118,12 +118,9 @@ class Question:
         """Return why no device takes part; empty if one does."""
         if self.scene.hand is None:
             return "the scene has no hand"
-        if self.coupling == "none":
+        if self.coupling is not None and self.coupling.name == "none":
             return "no coupling was chosen: the hand holds the tool itself"
-        if self.gains is not None:
-            return ""
-        field = COUPLING_FIELDS.get(self.coupling or "")
-        return f"the scene gives no gains under couplings{f'.{field}' if field else ''}"
+        return "" if self.gains is not None else "the scene gives no gains under couplings"
 
 
 Reason = Callable[[Question], str]
@@ -149,7 +146,7 @@ class Rule(NamedTuple):
         off = absent or self.off(q)
         unused = ""
         if self.parts and self.parts[0] not in q.uses:
-            unused = f"the law '{q.law}' does not use it"
+            unused = f"the law '{q.law.name}' does not use it"
         ignored = unused and not off and q.uses.isdisjoint(self.parts)
         left_out = self.left_out if isinstance(self.left_out, str) else self.left_out(q)
         why = absent or unused or off
@@ -463,7 +460,7 @@ EFFECTS: dict[str, Rule] = {
     # section VI: coupling and device
     "coupling": Rule(
         lambda q: (
-            f"{q.coupling or 'a coupling'} holds tool and device together, "
+            f"{q.coupling.name if q.coupling else 'a coupling'} holds tool and device together, "
             f"stiffness {numbers(q.gains.stiffness)} N/m, N m/rad"
         ),
         "the hand would hold the tool itself, without a device between",
@@ -499,25 +496,14 @@ EFFECTS: dict[str, Rule] = {
 EFFECT_NAMES = tuple(EFFECTS)
 
 
-def decide(
-    system: Any, law: Any = None, coupling: Any = None, rendering: str | None = None
-) -> tuple[Effect, ...]:
+def decide(system: Any, law: Any = None, coupling: Any = None) -> tuple[Effect, ...]:
     """Decide which effects are on for a scene's system (see `iapb.system.decide_effects`)."""
-    known = laws.ENGINE_LAWS.get(law) if isinstance(law, str) else law
-    if known is not law:
-        name = law
-    elif law is None:
-        name = None
-    else:
-        known = law.within(system.scene) if hasattr(law, "within") else law
-        name = known.name
-        rendering = getattr(known, "rendering", "full") if rendering is None else rendering
-    uses = getattr(known, "uses", laws.EVERYTHING)
-    if known is None:
+    law = law.within(system.scene) if hasattr(law, "within") else law
+    uses = getattr(law, "uses", laws.EVERYTHING)
+    if law is None:
         uses = laws.EVERYTHING | {laws.JOINTS, laws.JOINT_FRICTION, laws.TOUCH}
-    own_gains = coupling if hasattr(coupling, "stiffness") else None
-    q = Question(system, name, uses, getattr(coupling, "name", coupling), own_gains, rendering)
-    return tuple(rule.decide(name, q) for name, rule in EFFECTS.items())
+    question = Question(system, law, uses, coupling)
+    return tuple(rule.decide(name, question) for name, rule in EFFECTS.items())
 
 
 def ignored_fields(effects: Iterable[Any]) -> tuple[str, ...]:

@@ -8,6 +8,8 @@ import os
 import sys
 from collections.abc import Callable, Iterable
 from importlib import import_module
+from os import fspath
+from os.path import exists, isfile
 from typing import Any
 
 from iapb.errors import ArgumentError
@@ -31,6 +33,18 @@ def one_of(wrong: Any, known: Iterable[Any], lead: str = "one of ") -> str:
 def in_metres(length: float) -> str:
     """Return a length [m] as text, in millimetres below 1 m."""
     return f"{length:.3g} m" if length >= 1.0 else f"{1e3 * length:.3g} mm"
+
+
+def bytes_of(path: Any, most: int, expected: str) -> bytes:
+    """Return the first `most` bytes of a file; an ArgumentError says what file was expected."""
+    try:
+        if exists(path) and not isfile(path):
+            raise ValueError("no regular file")  # a pipe would be waited for
+        with open(fspath(path), "rb") as file:  # a number would be an open file
+            return file.read(most)
+    except (OSError, TypeError, ValueError) as failure:
+        reason = getattr(failure, "strerror", None) or failure
+        raise ArgumentError("path", str(path), f"{expected} ({reason})") from failure
 
 
 def function_named(argument: str, name: str) -> Callable[..., Any]:

@@ -27,6 +27,7 @@ from numpy.typing import ArrayLike
 
 from iapb.contact.impact import real_numbers
 from iapb.contact.laws import ContactLaw, ImpulseAugmented, Penalty, StepResult, copied_step
+from iapb.effects import decide
 from iapb.engines import Engine, is_engine
 from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import Coupling, NoCoupling
@@ -100,9 +101,8 @@ class Simulation:
         self.state = self.system.make_state()
         # else a subclass overrides it
         self.compiled = getattr(type(self.law), "advance", None) is Penalty.advance
-        self.effects = self.system.decide(self.law, self.coupling)
-        chosen = (self.law, self.effects) if self.compiled else (Penalty(),)
-        self.world = self.system.world_under(*chosen)
+        self.effects = decide(self.system, self.law, self.coupling)
+        self.world = self.system.world_under(self.law if self.compiled else Penalty())
         self.port = self.system.make_port(self.coupling, self.effects, external=device is not None)
         if not isinstance(self.coupling, NoCoupling):
             self.state.cut.whole[:] = self.system.tool_tree

@@ -117,12 +117,9 @@ class System:
             raise ArgumentError("margin", margin, "a distance in metres, infinity allowed")
         return self.finder.find(*self.mechanism.placements(q), margin)
 
-    def world_under(self, law: Any, effects: Sequence[Effect] | None = None) -> World:
+    def world_under(self, law: Any) -> World:
         """Return the parameters of the scene, with the switches of its effects under one of the
-        engine's laws; made once.
-
-        `effects` is the result of `decide` for the law and any coupling.
-        """
+        engine's laws; made once."""
         scene = self.scene
         contact = self.scene.contact
         mechanism = self.mechanism
@@ -130,7 +127,7 @@ class System:
         key = law.impulses, law.integrator, law.rendering, law.friction_in_impacts, law.pushing
         if key in self._worlds:
             return self._worlds[key]
-        on = active_names(self.decide(law) if effects is None else effects)
+        on = active_names(decide(self, law))
         scaled = "device_limits" in on and law.rendering in ("scale", "spread")
         limit = np.full(mechanism.nv, np.inf)
         if scaled and scene.device is not None:
@@ -270,7 +267,7 @@ class System:
         """Return hand, coupling and device at the scene's start, the device at the tool's position
         and velocity.
 
-        `effects` is the result of `decide` for the law; default: for ImpulseAugmented(). An
+        `effects` is the result of `iapb.effects.decide` for the law; default: for ImpulseAugmented(). An
         `external` device moves by itself: its delay and sensor resolution are its own, so the port
         adds neither.
         """
@@ -282,7 +279,9 @@ class System:
             raise ArgumentError(
                 "coupling", coupling.name, f"none: scene {scene.name} has no hand, so no device"
             )
-        on = active_names(self.decide(ImpulseAugmented(), coupling) if effects is None else effects)
+        on = active_names(
+            decide(self, ImpulseAugmented(), coupling) if effects is None else effects
+        )
         on -= {"delay", "quantisation"} if external else set()
         device = self.mechanism if hand is None else self.device_mechanism()
         v_start, v_stop = self.tool_dofs
@@ -338,11 +337,6 @@ class System:
             port.wrench[:] = scene_parts.wrench_of(scene, 0.0)
         return block(port)
 
-    def decide(self, law: Any, coupling: Coupling | None = None) -> tuple[Effect, ...]:
-        """Return the effects under a law and a coupling; the world, the port and the record are
-        made from them."""
-        return decide(self, law, coupling)
-
 
 _SYSTEMS: dict[
     int, System
@@ -360,10 +354,7 @@ def system_of(scene: Scene) -> System:
 
 
 def decide_effects(
-    scene: Scene,
-    law: ContactLaw | str | None = None,
-    coupling: Coupling | str | None = None,
-    rendering: str | None = None,
+    scene: Scene, law: ContactLaw | None = None, coupling: Coupling | None = None
 ) -> tuple[Effect, ...]:
     """Decide which effects are on for a scene and for the caller's choices.
 
@@ -372,12 +363,9 @@ def decide_effects(
     scene
         a checked scene.
     law, coupling
-        the objects, or their names in a run file, such as "penalty" and "four-channel". With None,
-        an effect is on if some law or coupling needs it. The attribute ``uses`` of a law names the
-        parts of the contact section that it uses (`iapb.contact.laws`); a law without it is assumed
-        to use all of them.
-    rendering
-        such as "scale"; default: the rendering of the law.
+        With None, an effect is on if some law or coupling needs it. The attribute ``uses`` of a law
+        names the parts of the contact section that it uses (`iapb.contact.laws`); a law without it
+        is assumed to use all of them.
 
     Returns
     -------
@@ -385,7 +373,7 @@ def decide_effects(
         all effects in a fixed order, each with its state, the reason, and what would change without
         it.
     """
-    return decide(system_of(scene), law, coupling, rendering)
+    return decide(system_of(scene), law, coupling)
 
 
 def coupling_of(scene: Scene, name: str) -> Coupling:

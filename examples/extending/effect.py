@@ -9,7 +9,7 @@ Prints:
 """
 
 from iapb import decide_effects, find_scene, load_scene
-from iapb.contact import laws
+from iapb.contact.laws import PENALTY, Penalty
 from iapb.effects import EFFECTS, Question, Rule
 
 
@@ -23,11 +23,11 @@ EFFECTS["pulling_contacts"] = Rule(
     on=lambda question: "contact.penalty = printed",
     left_out="a body that leaves would never be held back",
     off=clamped,
-    parts=(laws.PENALTY,),
+    parts=(PENALTY,),
 )
 
 scene = load_scene(find_scene("peg_corner"))
 for value in ("clamped", "printed"):
-    effects = decide_effects(scene.with_values({"contact.penalty": value}), law="penalty")
+    effects = decide_effects(scene.with_values({"contact.penalty": value}), law=Penalty())
     found = next(effect for effect in effects if effect.name == "pulling_contacts")
     print(found.active, found.reason)

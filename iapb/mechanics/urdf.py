@@ -30,7 +30,7 @@ from iapb.mechanics.bodies import Body
 from iapb.mechanics.joints import Joint, Mimic
 from iapb.mechanics.rotations import rotation_of
 from iapb.mechanics.structure import turned_inertia
-from iapb.names import one_of
+from iapb.names import bytes_of, one_of
 from iapb.numerics.linalg import product
 from iapb.numerics.schema import Floats
 
@@ -378,14 +378,7 @@ class _Builder(ElementTree.TreeBuilder):
 def parse_robot(path: Path) -> tuple[ElementTree.Element, Counter[str]]:
     """Return the robot element of a URDF file, and how often it has what is not read; an
     ArgumentError says what is wrong with the file."""
-    try:
-        if path.exists() and not path.is_file():
-            raise ValueError("no regular file")  # a pipe would be waited for
-        with path.open("rb") as file:
-            text = file.read(MAX_BYTES + 1)
-    except (OSError, ValueError) as error:  # ValueError: a name that no file can have
-        why = getattr(error, "strerror", None) or error
-        raise ArgumentError("path", str(path), f"a readable URDF file ({why})") from None
+    text = bytes_of(path, MAX_BYTES + 1, "a readable URDF file")
     if len(text) > MAX_BYTES:
         raise ArgumentError("URDF file", str(path), f"at most {MAX_BYTES} bytes")
     try:

@@ -3,15 +3,14 @@ value."""
 
 from __future__ import annotations
 
-from os import fspath
-from os.path import exists, isfile
+from os.path import isfile
 from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
 from iapb.errors import ArgumentError, Mistake, SceneError, shown
-from iapb.names import nearest, one_of
+from iapb.names import bytes_of, nearest, one_of
 from iapb.scene.document import MAX_CHARACTERS, Document
 from iapb.scene.mechanism import joint_fault
 from iapb.scene.model import Scene, scene_kind
@@ -110,23 +109,14 @@ def load_scene(path: str | Path) -> Scene:
 
 def read_text(path: str | Path) -> str:
     """Return the text of a scene file or a study; it raises the errors of `load_scene`."""
+    content = bytes_of(path, 4 * MAX_CHARACTERS + 1, "a readable scene file")
     try:
-        if exists(path := fspath(path)) and not isfile(path):  # a number would be an open file
-            raise ValueError("no regular file")  # a pipe would be waited for
-        with open(path, "rb") as file:
-            content = file.read(4 * MAX_CHARACTERS + 1)
-    except (OSError, TypeError, ValueError) as failure:
-        reason = getattr(failure, "strerror", None) or failure
-        raise ArgumentError("path", str(path), f"a readable scene file ({reason})") from failure
-    try:
-        text = content.decode("utf-8-sig")
+        return content.decode("utf-8-sig")
     except UnicodeDecodeError as failure:
         line = content.count(b"\n", 0, failure.start) + 1
         wrong = shown(content[failure.start : failure.end])
-        raise SceneError(
-            [Mistake(str(path), line, 1, "(file)", wrong, "text in UTF-8")]
-        ) from failure
-    return text
+        mistake = Mistake(str(path), line, 1, "(file)", wrong, "text in UTF-8")
+        raise SceneError([mistake]) from failure
 
 
 def scene_from_text(text: str, file: str = "(text)") -> Scene:

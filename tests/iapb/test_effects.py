@@ -11,8 +11,8 @@ import pytest
 from ruamel.yaml import YAML
 
 from iapb.contact.laws import ImpulseAugmented, Penalty
-from iapb.effects import COUPLING_FIELDS, EFFECTS, Effect
-from iapb.haptics.coupling import FourChannel, UnilateralCoupler
+from iapb.effects import EFFECTS, Effect
+from iapb.haptics.coupling import FourChannel, NoCoupling
 from iapb.scene import Scene, find_scene, load_scene, scene_names
 from iapb.system import decide_effects
 from reference.time_stepping import RigidConstraints
@@ -41,7 +41,7 @@ def test_a_scene_alone_switches_the_effect_and_the_reason_has_its_values(name: s
 
 
 RIGID = RigidConstraints()
-RUBBING = "impulse-augmented penalty with impact friction"
+RUBBING = ImpulseAugmented(friction_in_impacts=True)
 ROUGH = PEG.with_values({"contact.friction": 0.3})
 HALF_SMOOTH = ROUGH.with_values({f"walls.{PEG.walls[0].name}.friction": 0.0})
 BARE = PEG.with_values({"couplings": {}})
@@ -64,7 +64,7 @@ CHOSEN: list[tuple[str, Scene, tuple[Any, ...], bool, str, str]] = [
             ("contact_damping", "damping"),
             ("friction", "friction"),
         )
-        for law, on in (("penalty", True), (RIGID, False))
+        for law, on in ((Penalty(), True), (RIGID, False))
     ),
     *(
         (name, JOINTED, (DRIFTING,), False, "'drifting' does not use it", name)
@@ -72,18 +72,11 @@ CHOSEN: list[tuple[str, Scene, tuple[Any, ...], bool, str, str]] = [
     ),
     ("impact_friction", PER_BODY, (RUBBING,), False, "per_body", ""),
     *(
-        (name, PEG, (None, "none"), False, "no coupling", "")
+        (name, PEG, (None, NoCoupling()), False, "no coupling", "")
         for name in ("coupling", "device_limits", "delay", "quantisation", "device_damping")
     ),
-    (
-        "coupling",
-        PEG.with_values({"couplings.unilateral": None}),
-        (None, "four-channel"),
-        True,
-        "four-channel",
-        "",
-    ),
-    ("coupling", BARE, (None, "four-channel"), False, "couplings.four_channel", ""),
+    ("coupling", PEG, (None, GAINS), True, "four-channel", ""),
+    ("coupling", BARE, (), False, "no gains under couplings", ""),
     ("coupling", BARE, (None, GAINS), True, "[5, 6, 7]", ""),
     (
         "gravity",
@@ -102,13 +95,6 @@ def test_the_choices_of_the_caller_switch_the_effect(
 ) -> None:
     found = effect(scene, name, *choices)
     assert (found.active, found.ignores) == (on, ignores) and reason in found.reason
-
-
-def test_laws_and_couplings_are_known_by_name_and_an_unknown_law_uses_all() -> None:
-    assert decide_effects(PEG, "my law") == decide_effects(PEG)
-    for law in (ImpulseAugmented(), ImpulseAugmented(friction_in_impacts=True), Penalty()):
-        assert decide_effects(PEG, law.name, None, "full") == decide_effects(PEG, law)
-    assert {coupling.name for coupling in (FourChannel, UnilateralCoupler)} == set(COUPLING_FIELDS)
 
 
 @pytest.mark.parametrize("name", scene_names())
