@@ -73,8 +73,8 @@ class System:
         self.most_contacts = contact_capacity(self.shapes, self.pairs) + len(self.stops.bound)
         # a step that is cut also keeps those that have struck and are apart
         self.capacity = self.most_contacts * (2 if scene.contact.at_touch else 1)
-        self.joint_damping = scene_parts.joint_damping_of(scene)
-        self.joint_friction = scene_parts.joint_friction_of(scene)
+        self.joint_damping = scene_parts.joint_damping_of(scene, self.mechanism)
+        self.joint_friction = scene_parts.joint_friction_of(scene, self.mechanism)
         self.start = scene_parts.start_of(scene)
         self.restitutions = scene_parts.restitutions_of(scene, self.pairs)
         self.frictions = scene_parts.frictions_of(scene)

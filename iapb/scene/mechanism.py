@@ -7,6 +7,7 @@ because its last bits depend on the processor.
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any, NamedTuple
 
@@ -19,7 +20,7 @@ from iapb.contact.kernels.contact_set import TOUCHING
 from iapb.contact.kernels.world import Stops
 from iapb.errors import ArgumentError
 from iapb.mechanics.bodies import Body
-from iapb.mechanics.joints import KINDS, Joint, Mimic, ranges_of
+from iapb.mechanics.joints import Joint, Mimic, ranges_of
 from iapb.mechanics.mechanism import Mechanism
 from iapb.mechanics.rotations import rotation_of
 from iapb.mechanics.structure import carriers
@@ -148,32 +149,26 @@ def gravity_of(scene: Scene) -> Floats:
     return np.array([*(scene.gravity or ()), 0.0, 0.0, 0.0])[:3]
 
 
-def joint_damping_of(scene: Scene) -> Floats:
+def joint_damping_of(scene: Scene, mechanism: Mechanism) -> Floats:
     """Return the viscous damping (nv,) of each velocity [N s/m, N m s/rad]."""
-    return _by_velocity(scene, "joint_damping", 2)
+    return _by_velocity(mechanism, [body.joint_damping for body in scene.bodies], 2)
 
 
-def joint_friction_of(scene: Scene) -> Floats:
+def joint_friction_of(scene: Scene, mechanism: Mechanism) -> Floats:
     """Return the dry friction (nv,) of each velocity [N, N m]."""
-    return _by_velocity(scene, "joint_friction", 1)
+    return _by_velocity(mechanism, [body.joint_friction for body in scene.bodies], 1)
 
 
-def _by_velocity(scene: Scene, field: str, power: int) -> Floats:
-    """Return the values of a field by velocity. A joint that follows another one adds its own to
-    those of the leader, times a power of the multiplier."""
-    values: list[float] = []
-    starts: dict[str, int] = {}
-    followers = []
-    for body in scene.bodies:
-        given = getattr(body, field) or (0.0,) * KINDS[body.joint].nv
-        starts[body.name] = len(values)
-        if body.joint_mimic is None:
-            values += given
-        else:
-            followers.append((body.joint_mimic, given[0]))
-    for mimic, value in followers:
-        values[starts[mimic.body]] += abs(mimic.multiplier) ** power * value
-    return np.array(values, np.float64)
+def _by_velocity(mechanism: Mechanism, given: list[tuple[float, ...]], power: int) -> Floats:
+    """Return what the joints of the bodies have, by velocity. A joint that follows another one adds
+    its own to that of the leader, times a power of the multiplier."""
+    m = mechanism.arrays
+    own = np.zeros(mechanism.motions)
+    for start, values in zip(m.v_start.tolist(), given, strict=True):
+        own[start : start + len(values)] = values
+    found = np.zeros(mechanism.nv)
+    np.add.at(found, m.dof_leader, np.abs(m.dof_ratio) ** power * own)
+    return found
 
 
 def limits_of(scene: Scene) -> list[tuple[float, float] | None]:
@@ -388,12 +383,13 @@ def frictions_of(scene: Scene) -> Frictions:
     value counts; if neither does, `contact.friction` counts. So equal values are kept to the last
     bit, and everything slides on a body with mu = 0.
     """
-    alike: dict[float | None, int] = {}
-    classes = [alike.setdefault(owner.friction, len(alike)) for _, owner, _ in _owned_shapes(scene)]
+    general = scene.contact.friction
+    given = [owner.friction for _, owner, _ in _owned_shapes(scene)]
+    values = list(dict.fromkeys(given))
     stops = _stop_count(scene)
-    table = np.zeros((len(alike) + (stops > 0),) * 2)
-    for first, i in alike.items():
-        for second, k in alike.items():
-            own = [mu for mu in (first, second) if mu is not None] or [scene.contact.friction]
-            table[i, k] = own[0] if own[0] == own[-1] else math.sqrt(own[0] * own[-1])
-    return Frictions(np.array(classes + [len(alike)] * stops, np.int64), table)
+    table = np.zeros((len(values) + (stops > 0),) * 2)
+    for (i, first), (k, second) in itertools.product(enumerate(values), repeat=2):
+        own = [mu for mu in (first, second) if mu is not None] or [general]
+        table[i, k] = own[0] if own[0] == own[-1] else math.sqrt(own[0] * own[-1])
+    classes = [values.index(mu) for mu in given] + [len(values)] * stops
+    return Frictions(np.array(classes, np.int64), table)

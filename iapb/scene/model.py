@@ -257,12 +257,11 @@ class Hand(ScenePart):
             ]
         return force
 
-    def largest_force(self, duration: float = 0.0) -> float:
-        """Return the magnitude of the largest force [N] at t = 0, at the table's times and 200
-        times of a function."""
+    def largest_force(self) -> float:
+        """Return the magnitude of the largest force [N] at t = 0 and at the table's times."""
         return max(
             math.hypot(*force[: 2 if len(force) == 3 else 3])
-            for force in map(self.force_at, self.times(duration))
+            for force in map(self.force_at, self.times())
         )
 
     def times(self, duration: float = 0.0) -> list[float]:
