@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from iapb.contact import laws
+from iapb.errors import counted
 from iapb.scene import Scene
 from iapb.scene.model import Device
 
@@ -99,7 +100,7 @@ class Question:
     def turning(self) -> str:
         """The bodies whose joints rotate, as text."""
         names = [body.name for body in self.scene.bodies if body.joint in TURNING_JOINTS]
-        return f"the joint{'' if len(names) == 1 else 's'} of {', '.join(names)}"
+        return f"{'the joint' if len(names) == 1 else 'the joints'} of {', '.join(names)}"
 
     @property
     def gains(self) -> Any:
@@ -158,10 +159,6 @@ def numbers(values: Any) -> str:
     return "[" + ", ".join(f"{value:g}" for value in values) + "]"
 
 
-def _count(pairs: int) -> str:
-    return "1 pair" if pairs == 1 else f"{pairs} pairs"
-
-
 def _weightless(q: Question) -> str:
     """Return why gravity moves nothing; empty if it moves something."""
     if q.sinking:
@@ -184,8 +181,9 @@ def _push(q: Question) -> str:
         units = "N, N, N m" if len(hand.force) == 3 else "N, N, N, N m, N m, N m"
         return f"the hand pushes {hand.body} with {said[0]} {units}"
     if rows := hand.force_table:
-        count = "1 row" if len(rows) == 1 else f"{len(rows)} rows"
-        said.append(f"hand.force_table, {count} from {rows[0][0]:g} to {rows[-1][0]:g} s")
+        said.append(
+            f"hand.force_table, {counted(len(rows), 'row')} from {rows[0][0]:g} to {rows[-1][0]:g} s"
+        )
     if hand.force_function:
         said.append(f"hand.force_function = [{', '.join(hand.force_function)}]")
     return f"the hand pushes {hand.body}: {' + '.join(said)}"
@@ -348,18 +346,20 @@ EFFECTS: dict[str, Rule] = {
     "joint_limits": _joints("limits", "rad, m", "joints would turn and slide without end"),
     # what can touch
     "wall_contacts": Rule(
-        lambda q: f"{_count(q.pairs['walls'])} of a moving shape and a static one can touch",
+        lambda q: (
+            f"{counted(q.pairs['walls'], 'pair')} of a moving shape and a static one can touch"
+        ),
         "bodies would pass through walls",
         lambda q: "" if q.pairs["walls"] else "no moving shape has a static one to touch",
     ),
     "body_contacts": Rule(
-        lambda q: f"{_count(q.pairs['others'])} of shapes of separate bodies can touch",
+        lambda q: f"{counted(q.pairs['others'], 'pair')} of shapes of separate bodies can touch",
         "moving bodies would pass through each other",
         lambda q: "" if q.pairs["others"] else "no two separate moving bodies have shapes",
     ),
     "self_collisions": Rule(
         lambda q: (
-            f"contact.self_collisions = true, and {_count(q.pairs['links'])} of links that are not "
+            f"contact.self_collisions = true, and {counted(q.pairs['links'], 'pair')} of links that are not "
             f"neighbours "
             "can touch"
         ),

@@ -23,6 +23,11 @@ def shown(value: Any) -> str:
     return text if len(text) <= _SHOWN_CHARACTERS else text[: _SHOWN_CHARACTERS - 1] + "…"
 
 
+def counted(count: int, noun: str) -> str:
+    """Return a count with its noun: "1 collision", "2 collisions"."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
 # Terminal control characters, and characters without a width or that change the direction of text;
 # not tabs, line ends.
 _ORDERS = re.compile(
@@ -109,10 +114,9 @@ class SceneError(IapbError, ValueError):
     def __init__(self, mistakes: list[Mistake], what: str = "scene") -> None:
         self.mistakes = tuple(mistakes)
         count = len(self.mistakes)
-        head = f"1 mistake in the {what}" if count == 1 else f"{count} mistakes in the {what}"
         lines = [f"  {mistake}" for mistake in self.mistakes[:_LISTED_MISTAKES]]
         lines += [f"  and {count - len(lines)} more"] if count > len(lines) else []
-        super().__init__("\n".join([f"{head}:", *lines]))
+        super().__init__("\n".join([f"{counted(count, 'mistake')} in the {what}:", *lines]))
 
 
 class MissingDependencyError(IapbError, ImportError):

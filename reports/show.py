@@ -141,11 +141,6 @@ def duration(seconds: float) -> str:
     return f"{seconds * 1e6:.3g} µs"
 
 
-def counted(count: int, noun: str) -> str:
-    """Return a count with its noun: "1 collision", "2 collisions"."""
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
-
-
 @contextmanager
 def stage_progress(
     begun: str = "", transient: bool = False

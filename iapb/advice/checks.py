@@ -27,6 +27,7 @@ from iapb.contact.finding import Contacts
 from iapb.contact.kernels.implicit import COMPLIANCE, FADING
 from iapb.contact.kernels.touch import MOST_SAMPLES
 from iapb.contact.solids import joined
+from iapb.errors import counted
 from iapb.names import in_metres
 from iapb.numerics.schema import Floats, Integers
 from iapb.scene import Scene, SpatialScene, mechanism
@@ -590,8 +591,8 @@ def _too_stiff(start: Start) -> Iterator[Caution]:
         field,
         limits.where,
         f"contact.{field} = {getattr(contact, field):g} {_UNITS[field]} is more than a "
-        f"step of {start.scene.rate:g} Hz can hold at {limits.where} ({limits.contacts} contact"
-        f"{'s' * (limits.contacts > 1)}, effective mass {limits.mass:.3g} kg): set "
+        f"step of {start.scene.rate:g} Hz can hold at {limits.where} ({counted(limits.contacts, 'contact')}, "
+        f"effective mass {limits.mass:.3g} kg): set "
         f"contact.{field} <= "
         f"{_down(getattr(limits, field)):g}, or rate >= {_up(limits.rate):g} Hz",
     )
@@ -729,7 +730,7 @@ def _growing(start: Start, coupling: str, loops: dict[str, HapticLoop], where: s
 def _limit(loop: HapticLoop) -> str:
     """Return the limit that a loop breaks, where a closed form says it."""
     if loop.delay:
-        return f", with a delay of {loop.delay} step{'s' * (loop.delay > 1)} each way"
+        return f", with a delay of {counted(loop.delay, 'step')} each way"
     share = float((2.0 * loop.damping * loop.dt * np.diag(np.linalg.inv(loop.mass))).max())
     return f", for B Δt/(m/2) = {share:.3g} is above its limit 2" if share >= 2.0 else ""
 

@@ -26,7 +26,7 @@ from iapb.contact.kernels.resolve import (
     resolve_each,
 )
 from iapb.contact.kernels.unilateral import ShareWork
-from iapb.errors import ArgumentError, IapbError, RangeError, SolverError
+from iapb.errors import ArgumentError, IapbError, RangeError, SolverError, counted
 from iapb.names import one_of
 from iapb.numerics.compiled import Entry, block
 from iapb.numerics.linalg import cholesky
@@ -496,9 +496,7 @@ def _array(name: str, value: Any, dimensions: int) -> Floats:
         raise ArgumentError(name, value, "an array of real numbers")
     array = given.astype(np.float64, copy=False)
     if array.ndim != dimensions:
-        raise ArgumentError(
-            name, array.shape, f"an array of {dimensions} dimension{'s' * (dimensions > 1)}"
-        )
+        raise ArgumentError(name, array.shape, f"an array of {counted(dimensions, 'dimension')}")
     return array
 
 

@@ -25,7 +25,7 @@ from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
-from iapb.errors import ArgumentError
+from iapb.errors import ArgumentError, counted
 from iapb.mechanics.bodies import Body
 from iapb.mechanics.joints import Joint, Mimic
 from iapb.mechanics.rotations import rotation_of
@@ -459,7 +459,7 @@ def numbers_in(where: str, text: str | None, count: int) -> Floats:
     except ValueError:
         values = np.zeros(0)
     if len(values) != count or not np.isfinite(values).all():
-        raise ArgumentError(where, text, f"{count} finite number{'s' if count > 1 else ''}")
+        raise ArgumentError(where, text, counted(count, "finite number"))
     return values
 
 

@@ -26,6 +26,7 @@ from pydantic import (
     model_validator,
 )
 
+from iapb.errors import counted
 from iapb.mechanics.joints import KINDS
 from iapb.scene.parts import (
     Name,
@@ -63,11 +64,6 @@ def with_direction(vector: tuple[float, ...]) -> tuple[float, ...]:
     # the direction of a shorter one would be rounding error
     require(math.hypot(*vector) >= 1e-9, "a vector with a direction (length at least 1e-9)")
     return vector
-
-
-def counted(count: int) -> str:
-    """Return "1 number" or "3 numbers"."""
-    return f"{count} number{'' if count == 1 else 's'}"
 
 
 class Box(ScenePart):
@@ -368,7 +364,7 @@ class AnyBody(ScenePart):
         elif field == "position":
             require(
                 len(given) in (0, kind.nq),
-                f"{counted(kind.nq)}, one per coordinate of a {joint} joint",
+                f"{counted(kind.nq, 'number')}, one per coordinate of a {joint} joint",
             )
             turn = {"continuous": given, "spherical": given, "free_flyer": given[3:]}.get(joint)
             unit = not turn or abs(math.hypot(*turn) - 1.0) <= UNIT_TOLERANCE
@@ -377,7 +373,7 @@ class AnyBody(ScenePart):
         elif field != "joint_limits":
             require(
                 len(given) in (0, kind.nv),
-                f"{counted(kind.nv)}, one per velocity of a {joint} joint",
+                f"{counted(kind.nv, 'number')}, one per velocity of a {joint} joint",
             )
             return given or (0.0,) * kind.nv * (field == "velocity")
         return given

@@ -24,7 +24,7 @@ from pydantic import (
 )
 from pydantic.json_schema import models_json_schema
 
-from iapb.errors import ArgumentError, SceneError
+from iapb.errors import ArgumentError, SceneError, counted
 from iapb.mechanics.joints import KINDS
 from iapb.names import one_of
 from iapb.scene.bodies import (
@@ -36,7 +36,6 @@ from iapb.scene.bodies import (
     SpatialWall,
     V,
     Wall,
-    counted,
 )
 from iapb.scene.document import Document, yaml_text
 from iapb.scene.expressions import Expression, function_of
@@ -605,7 +604,7 @@ def _tool(given: dict[str, Any], bodies: list[_Outline]) -> Mistakes:
         for field in ("force_limit", "position_resolution", "stiffness", "damping"):
             numbers = section.get(field) if isinstance(section, dict) else None
             if isinstance(numbers, list | tuple) and len(numbers) != coordinates:
-                expected = f"{counted(coordinates)}, one per coordinate of the tool"
+                expected = f"{counted(coordinates, 'number')}, one per coordinate of the tool"
                 yield (*path, field), numbers, expected
 
 

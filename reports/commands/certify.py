@@ -14,9 +14,9 @@ import typer
 
 from iapb import Certificate, certify_impacts
 from iapb import certify as certify_run
-from iapb.errors import ArgumentError, IapbError, RunFileError
+from iapb.errors import ArgumentError, IapbError, RunFileError, counted
 from reference.hdf5 import READ_BUDGET
-from reports.show import Answer, Json, counted, one_line, said
+from reports.show import Answer, Json, one_line, said
 from reports.store.check import is_run
 from reports.store.io import written_aside
 from reports.store.runs import opened_run

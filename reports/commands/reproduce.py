@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 import typer
 
-from iapb.errors import ArgumentError
+from iapb.errors import ArgumentError, counted
 from iapb.lazy import needed
 from iapb.names import nearest
 from reports.commands.report import difference_lines
@@ -27,7 +27,7 @@ from reports.pages.first import count_claims
 from reports.pages.records import FailedCases
 from reports.report import keep_answer, kept_answer, report_key, write_companions, write_report
 from reports.runner import Runner
-from reports.show import Answer, Json, counted, stage_progress
+from reports.show import Answer, Json, stage_progress
 from reports.store.io import write_whole
 from reports.uses import parsed
 from verification.finding import REPRODUCED, Failure, Finding

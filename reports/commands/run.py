@@ -12,13 +12,13 @@ import typer
 
 from iapb.advice.checks import check_scene
 from iapb.effects import ignored_fields
-from iapb.errors import to_stderr
+from iapb.errors import counted, to_stderr
 from iapb.run import INTERRUPTED, Run
 from iapb.scene import Scene, find_scene, load_scene, scene_names
 from iapb.system import System
 from iapb.worlds import find_world
 from reports.runner import Runner
-from reports.show import Answer, Json, counted, duration, one_line, stage_progress
+from reports.show import Answer, Json, duration, one_line, stage_progress
 from reports.store.io import blocks
 from reports.uses import parsed
 
