@@ -86,12 +86,12 @@ class Question:
         """Names of bodies whose generalized gravity force is not exactly zero at all of some random
         poses."""
         mechanism = self.system.mechanism
-        field = self.scene.gravity or ()
+        field = self.system.gravity
         chance = np.random.default_rng(0)
-        q = np.array([x for body in self.scene.bodies for x in body.position], np.float64)
+        q, _ = self.system.start
         felt = np.zeros(mechanism.nv, np.bool_)
-        for _ in range(_POSES if any(field) else 0):
-            felt |= mechanism.gravity(q, [*field, 0.0][:3]) != 0.0
+        for _ in range(_POSES if field.any() else 0):
+            felt |= mechanism.gravity(q, field) != 0.0
             q = mechanism.integrate(q, chance.uniform(-1.0, 1.0, mechanism.nv), 1.0)
         felt_by = mechanism.arrays.dof_body[: mechanism.nv][felt]
         return [mechanism.names[b] for b in dict.fromkeys(felt_by.tolist())]
@@ -163,7 +163,7 @@ def _weightless(q: Question) -> str:
     """Return why gravity moves nothing; empty if it moves something."""
     if q.sinking:
         return ""
-    if not any(q.scene.gravity or ()):
+    if not q.system.gravity.any():
         return "the scene gives no gravity"
     if not any(body.mass > 0.0 for body in q.scene.bodies):
         return "no body has mass"

@@ -26,8 +26,13 @@ def one_of(wrong: Any, known: Iterable[Any], lead: str = "one of ") -> str:
     """Say what was expected instead of `wrong`: ``one of peg_corner, two_discs; did you mean
     peg_corner?``."""
     names = [str(name) for name in known]
-    near = nearest(wrong, names)
-    return lead + ", ".join(names) + (f"; did you mean {near}?" if near else "")
+    return lead + ", ".join(names) + hint(wrong, names)
+
+
+def hint(wrong: Any, known: Iterable[Any]) -> str:
+    """Return text that asks for the known name most similar to `wrong`; empty if none is similar."""
+    near = nearest(wrong, known)
+    return f"; did you mean {near}?" if near else ""
 
 
 def in_metres(length: float) -> str:
@@ -72,9 +77,7 @@ def object_named(argument: str, name: str, form: str) -> Any:
         why = f"{type(error).__name__}: {error}"
         raise ArgumentError(argument, name, f"a module that can be imported ({why})") from error
     if not hasattr(home, attribute):
-        near = nearest(attribute, [word for word in dir(home) if not word.startswith("_")])
-        guess = f"; did you mean {near}?" if near else ""
-        raise ArgumentError(
-            argument, name, f"a name of the module {module}, which has no {attribute}{guess}"
-        )
+        public = [word for word in dir(home) if not word.startswith("_")]
+        expected = f"a name of the module {module}, which has no {attribute}"
+        raise ArgumentError(argument, name, expected + hint(attribute, public))
     return getattr(home, attribute)

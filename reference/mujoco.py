@@ -169,7 +169,7 @@ class MuJoCo:
         spec.compiler.degree = False  # limits of hinges are in radians
         spec.compiler.boundmass = spec.compiler.boundinertia = LEAST
         spec.option.timestep = scene.step / self.substeps
-        spec.option.gravity = [*(scene.gravity or ()), 0.0, 0.0, 0.0][:3]
+        spec.option.gravity = scene_parts.gravity_of(scene)
         spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
         spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_AUTORESET
         flat = len(scene.bodies[0].origin) == 2

@@ -20,7 +20,7 @@ from iapb.mechanics.rotations import rotation_of
 from iapb.names import in_metres
 from iapb.numerics.schema import Booleans, Floats, Integers
 from iapb.run import UNSOLVED, Run
-from iapb.scene.bodies import inertia_matrix
+from iapb.scene.bodies import in_space, inertia_matrix
 from iapb.scene.mechanism import limits_of, shape_names
 from iapb.scene.reading import scene_from_values
 from iapb.system import System
@@ -323,7 +323,7 @@ def _spun(seen: _Seen) -> Iterator[str]:
             linear = (turn @ v[:, :3, None])[..., 0]
             inertia = inertia_matrix(body.inertia)
         spin = turn @ (angular @ inertia / np.linalg.norm(inertia, 2))[..., None]  # R I w / |I|
-        arm = np.cross(angular, np.array([*body.center_of_mass, 0.0])[:3])
+        arm = np.cross(angular, in_space(body.center_of_mass))
         speed = turn @ arm[..., None] + linear[..., None]
         falls = seen.system.gravity[:, None] * run.dt
         fastest = np.linalg.norm(linear, axis=1).max()

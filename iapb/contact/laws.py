@@ -54,11 +54,9 @@ def copied_step(system: Any, state: State) -> StepResult:
     states = state.state_of_tree
     tool = system.tool_tree
     # As the kernel `contact_state` does, without numba's look-up of types.
-    told = (
-        states[tool]
-        if tool >= 0
-        else next((each for each in (COLLIDING, RESTING) if each in states), FREE)
-    )
+    told = next((each for each in (COLLIDING, RESTING) if each in states), FREE)
+    if tool >= 0:
+        told = states[tool]
     return StepResult(
         state.q.copy(),
         state.v.copy(),
@@ -184,13 +182,9 @@ class ImpulseAugmented(_EngineLaw):
     @property
     def name(self) -> str:
         """Name of the law; it says whether friction acts in impacts or contacts only push."""
-        extra = (
-            " with impact friction"
-            if self.friction_in_impacts
-            else ", contacts only push"
-            if self.pushing
-            else ""
-        )
+        extra = ", contacts only push" if self.pushing else ""
+        if self.friction_in_impacts:
+            extra = " with impact friction"
         return f"impulse-augmented penalty{extra}"
 
     @property

@@ -454,6 +454,11 @@ def inertia_matrix(inertia: Any) -> NDArray[np.float64]:
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], np.float64)
 
 
+def in_space(vector: Sequence[float]) -> NDArray[np.float64]:
+    """Return a vector (3,) of the plane or of space."""
+    return np.array([*vector, 0.0])[:3]
+
+
 @np.errstate(divide="raise", invalid="raise")
 def filled_with(shapes: Sequence[Any], density: float) -> dict[str, Any]:
     """Return `mass`, `center_of_mass` and `inertia` of shapes of one density, without BLAS;

@@ -26,7 +26,7 @@ from iapb.mechanics.rotations import rotation_of
 from iapb.mechanics.structure import carriers
 from iapb.numerics.linalg import product
 from iapb.numerics.schema import Booleans, Floats, Indices, Integers
-from iapb.scene.bodies import WORLD, inertia_matrix
+from iapb.scene.bodies import WORLD, in_space, inertia_matrix
 from iapb.scene.model import Scene, SpatialScene
 from iapb.scene.parts import SMALLEST_POSITIVE
 
@@ -47,31 +47,28 @@ def mechanism_of(scene: Scene) -> Mechanism:
 
 
 def _body_in_space(body: Any) -> Body:
-    flat = len(body.origin) == 2
     mimic = body.joint_mimic
-    rotation = np.eye(3)
-    lift = (0.0,) if flat else ()
-    turn = _turn(body)
-    rotation[: len(turn), : len(turn)] = turn
+    joint = Joint(body.joint)
+    if body.axis is not None:
+        x, y, z = in_space(body.axis).tolist()
+        joint = Joint(body.joint, (x, y, z))
+    flat = len(body.origin) == 2
     return Body(
         name=body.name,
         parent=None if body.parent == WORLD else body.parent,
-        joint=Joint(body.joint) if body.axis is None else Joint(body.joint, (*body.axis, *lift)),
-        placement=(rotation, np.array([*body.origin, *lift])),
+        joint=joint,
+        placement=(_turn(body), in_space(body.origin)),
         mass=body.mass,
-        center_of_mass=np.array([*body.center_of_mass, *lift]),
+        center_of_mass=in_space(body.center_of_mass),
         inertia=np.diag([0.5, 0.5, 1.0]) * body.inertia if flat else inertia_matrix(body.inertia),
         mimic=mimic and Mimic(mimic.body, mimic.multiplier, mimic.offset),
     )
 
 
 def _turn(placed: Any) -> Floats:
-    """Return the rotation matrix of a placement: (3, 3) in space, (2, 2) in the plane."""
-    return (
-        rotation_of(placed.rpy)
-        if hasattr(placed, "rpy")
-        else rotation_of((0.0, 0.0, placed.angle))[:2, :2]
-    )
+    """Return the rotation matrix (3, 3) of a placement, without negative zeros."""
+    rpy = placed.rpy if hasattr(placed, "rpy") else (0.0, 0.0, placed.angle)
+    return rotation_of(rpy) + 0.0
 
 
 def start_of(scene: Scene) -> tuple[Floats, Floats]:
@@ -139,14 +136,14 @@ def hand_force_of(scene: Scene, mechanism: Mechanism, q: Floats, time: float) ->
     if scene.hand is None or not wrench.any():
         return np.zeros(mechanism.nv)
     body = mechanism.index(scene.hand.body)
-    lever = mechanism.placements(q)[0][body] @ np.array([*scene.hand.point, 0.0])[:3]
+    lever = mechanism.placements(q)[0][body] @ in_space(scene.hand.point)
     wrench[3:] += np.cross(lever, wrench[:3])
     return mechanism.frame_jacobian(q, body).T @ wrench
 
 
 def gravity_of(scene: Scene) -> Floats:
     """Return the acceleration (3,) by gravity [m/s²]."""
-    return np.array([*(scene.gravity or ()), 0.0, 0.0, 0.0])[:3]
+    return in_space(scene.gravity or (0.0, 0.0))
 
 
 def joint_damping_of(scene: Scene, mechanism: Mechanism) -> Floats:
@@ -195,25 +192,22 @@ def shapes_of(scene: Scene) -> Shapes:
     A shape of a body that cannot move (all joints between it and the world are fixed) is static,
     like a wall.
     """
-    space = isinstance(scene, SpatialScene)
-    n = 3 if space else 2
     index = {body.name: i for i, body in enumerate(scene.bodies)}
     made = []
     for body, _, shape in _owned_shapes(scene):
-        rotation = np.eye(n)
-        shift = np.zeros(n)
+        rotation = np.eye(3)
+        shift = np.zeros(3)
         link = body
         while link >= 0 and scene.bodies[link].joint == "fixed":
             turn = _turn(scene.bodies[link])
             rotation = product(turn, rotation)
-            shift = product(turn, shift) + scene.bodies[link].origin
+            shift = product(turn, shift) + in_space(scene.bodies[link].origin)
             link = index.get(scene.bodies[link].parent, -1)
-        made.append(
-            _placed(shape, -1, rotation, shift)
-            if link < 0
-            else _placed(shape, body, np.eye(n), np.zeros(n))
-        )
-    return make_shapes(made, space)
+        if link < 0:
+            made.append(_placed(shape, -1, rotation, shift))
+        else:
+            made.append(_placed(shape, body, np.eye(3), np.zeros(3)))
+    return make_shapes(made, isinstance(scene, SpatialScene))
 
 
 def _placed(shape: Any, body: int, rotation: Floats, shift: Floats) -> geometry.Shape:
@@ -222,25 +216,23 @@ def _placed(shape: Any, body: int, rotation: Floats, shift: Floats) -> geometry.
         normal = np.array(shape.normal) / math.hypot(*shape.normal)
         return geometry.Shape(geometry.HALF_PLANE, vertices=[shape.point, normal])
     if shape.kind == "half_space":
-        return geometry.Shape(
-            geometry.HALF_SPACE, center=shape.point, axes=frame_along(np.array(shape.normal))
-        )
-    center = product(rotation, shape.center) + shift
+        axes = frame_along(np.array(shape.normal))
+        return geometry.Shape(geometry.HALF_SPACE, center=shape.point, axes=axes)
+    center = product(rotation, in_space(shape.center)) + shift
     if shape.kind == "circle":
-        return geometry.Shape(geometry.CIRCLE, body, shape.radius, [center], [*center, 0.0])
+        return geometry.Shape(geometry.CIRCLE, body, shape.radius, [center[:2]], center)
     if shape.kind == "sphere":
         return geometry.Shape(geometry.SPHERE, body, shape.radius, center=center)
     turn = product(rotation, _turn(shape))
-    if len(turn) == 3:
-        return geometry.Shape(
-            geometry.BOX, body, center=center, axes=turn, half_size=0.5 * np.array(shape.size)
-        )
-    corners = (
-        shape.vertices
-        if shape.kind == "polygon"
-        else 0.5 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * shape.size
-    )
-    return geometry.Shape(geometry.POLYGON, body, vertices=product(corners, turn.T) + center)
+    if len(shape.center) == 3:
+        half = 0.5 * np.array(shape.size)
+        return geometry.Shape(geometry.BOX, body, center=center, axes=turn, half_size=half)
+    if shape.kind == "polygon":
+        corners = shape.vertices
+    else:
+        corners = 0.5 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * shape.size
+    vertices = product(corners, turn[:2, :2].T) + center[:2]
+    return geometry.Shape(geometry.POLYGON, body, vertices=vertices)
 
 
 def pairs_of(scene: Scene, mechanism: Mechanism, shapes: Shapes) -> tuple[Pairs, tuple[str, ...]]:

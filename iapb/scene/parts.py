@@ -18,7 +18,7 @@ from pydantic import (
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from iapb.errors import Mistake, shown
-from iapb.names import nearest
+from iapb.names import hint, nearest
 
 # SI units; products of four such numbers are far below the double overflow limit
 LARGEST_NUMBER = 1e9
@@ -125,11 +125,11 @@ class ScenePart(BaseModel):
         if kind in _EXPECTED:
             expected = _EXPECTED[kind].format(**words)
             listed = re.findall("'([^']*)'", words.get("expected_tags", words.get("expected", "")))
-            near = nearest(words.get("tag", value), listed) if listed else ""
-            expected += f"; did you mean {near}?" if near else ""
+            expected += hint(words.get("tag", value), listed)
         if kind == "extra_forbidden" and len(where) == 1:
             near = nearest(where[0], cls.model_fields)
-            expected = f"{KNOWN_FIELDS}{f' (did you mean {near}?)' if near else ''}: {', '.join(cls.model_fields)}"
+            guess = f" (did you mean {near}?)" if near else ""
+            expected = f"{KNOWN_FIELDS}{guess}: {', '.join(cls.model_fields)}"
         if kind == "missing":
             field = cls.model_fields.get(str(where[0])) if len(where) == 1 else None
             expected = f"this field: {field.description}" if field else "one item more in this list"

@@ -75,14 +75,11 @@ def find_scene(name: str | Path, folder: str = "") -> Path:
     if str(name) in (path.stem, path.name) and isfile(ours):
         return ours
     said = one_of(path.stem, scene_names(folder), "a file, or one of: ")
-    near = ""
     if path.suffix:  # a file was meant
         near = nearest(path.name, (file.name for file in path.parent.glob(f"*{path.suffix}")))
-    raise ArgumentError(
-        "scene",
-        str(name),
-        f"{said.partition('; did')[0]}; did you mean {path.parent / near}?" if near else said,
-    )
+        if near:
+            said = f"{said.partition('; did')[0]}; did you mean {path.parent / near}?"
+    raise ArgumentError("scene", str(name), said)
 
 
 def load_scene(path: str | Path) -> Scene:
