@@ -6,8 +6,6 @@ Without a browser the tests are skipped, and say so.
 """
 
 import shutil
-import subprocess
-import sys
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -21,8 +19,6 @@ from reports.figures.paper import arm_energies
 from reports.pages.builder import build_report, draw_all
 from reports.pages.records import Evidence
 from reports.report import write_report
-from reports.store.runs import read_run
-from reports.view.loop import PULLED
 from tests.reports.made_up import made_motion
 from verification.finding import MIXED, REPRODUCED, Part, finding_of
 from verification.table import titled
@@ -295,16 +291,6 @@ def test_the_keyboard_reaches_everything(see, first, name):
         assert reached == REACHED[name]
 
 
-def test_a_link_into_something_folded_unfolds_it(see, first):
-    with see("claims") as sight:
-        sight.ask("() => { document.querySelector('#C01 details p').id = 'within'; }")
-        sight.ask("() => { location.hash = '#within'; }")
-        sight.page.wait_for_function("() => document.querySelector('#C01 details').open")
-        sight.page.goto(first.as_uri())
-        sight.page.locator("main a", has_text="C01").click()
-        sight.page.wait_for_function("() => document.getElementById('C01') !== null")
-
-
 def test_print_shows_the_content_and_no_controls(see):
     for page, unfolded in (("claims", "#C01 .says"), ("figures", "#fig07 .fold table")):
         with see(page) as sight:
@@ -345,35 +331,3 @@ def test_the_cursor_reads_the_values_of_the_run(desk, evidence):
     assert np.ptp(near) < np.ptp(x) / 10  # or the bracket would say nothing
     # The panels over time read together.
     assert desk.page.locator("#fig07 .readout:visible").count() == 3
-
-
-def test_the_mouse_pulls_the_peg_out_of_the_corner_and_closing_the_page_stores_the_run(
-    started, tmp_path
-):
-    command = [
-        sys.executable,
-        "-m",
-        "reports.cli",
-        "view",
-        "peg_corner",
-        "--no-browser",
-        "--out",
-        str(tmp_path),
-    ]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
-        address = next(line.split()[1] for line in process.stderr if line.startswith("Open "))
-        page = started.new_page(viewport={"width": 800, "height": 560})
-        page.goto(address)
-        page.wait_for_timeout(6000)  # the peg comes to rest in the corner
-        page.mouse.move(472, 336)
-        page.mouse.down()
-        for step in range(8):
-            page.mouse.move(472 - 25 * step, 336 - 25 * step)
-        page.wait_for_timeout(2000)
-        page.mouse.up()
-        page.close()
-        assert process.wait(timeout=120) == 0
-    [file] = tmp_path.glob("peg_corner-IAPB-*.h5")
-    run = read_run(file)
-    pulled = np.flatnonzero(np.any(run.hand_force != run.hand_force[0], axis=1))
-    assert PULLED in run.remarks and np.ptp(run.q[pulled, :2], axis=0).min() > 5e-3

@@ -5,12 +5,7 @@ import json
 import os
 import re
 import shlex
-import signal
-import subprocess
-import sys
-import time
 from contextlib import contextmanager
-from functools import partial
 from importlib import import_module
 from pathlib import Path
 
@@ -20,7 +15,6 @@ import pytest
 from iapb.errors import SceneError
 from reports import cli, show
 from reports.store.runs import read_run
-from verification.cost.accuracy import Choice
 from verification.finding import REPRODUCED, Failure, Finding, Part, with_failures
 from verification.table import Column, Table, titled
 
@@ -28,7 +22,6 @@ ROOT = Path(__file__).parents[2]
 SLOPE = ROOT / "tests" / "verification" / "worlds" / "slope.yaml"
 SHORT = ("peg_corner", "--set", "duration=0.4")
 STUDY = "scene: two_discs\nvalues:\n  contact.restitution: [0.0, 0.5]\n"
-LOADED = 20.0  # [s] after which a command is at work, on a busy machine too
 WRONG = "verification.laws.planted:wrong_sign"
 FAILED = Failure("four contacts", "SolverError", "no solution")
 WRONG_SCENE = """\
@@ -112,100 +105,44 @@ def listed(command):
 
 REFUSED = [  # status, command line, what the refusal says
     (2, "walk", "Usage"),
-    (2, "run", "Usage"),
     (2, "", "Usage"),
     (2, "run peg_corner --speed 3", "No such option"),
-    (2, "inspect", "Usage"),
     (2, "inspect run.h5 --impacts -3", "--impacts"),
-    (2, "verify --seed -1", "--seed"),
-    (2, "sweep corner_tilt --workers 99999999", "--workers"),
-    (2, "compare --worlds PB", "Usage"),
     (1, "run wrong.yaml", "wrong.yaml:2:"),
-    (1, "run wrong.yaml", "bodies[0].joint"),
-    (1, "effects wrong.yaml", "wrong.yaml:6:"),
     (1, "effects wrong.yaml", "contact.stiffness"),
-    (1, "run no_such_scene", "no_such_scene"),
     (1, "run peg_cornr", "did you mean peg_corner?"),
     (1, "run bal.yaml", "did you mean ball.yaml?"),
-    (1, "run scenes/peg_cornr.yaml", "did you mean peg_corner?"),
     (1, "run peg_corner --world best", "world = 'best': expected one of IAPB, PB, "),
-    (1, "run peg_corner --world iapb", "did you mean IAPB?"),
     (1, "run peg_corner --rendering clip", "'clip'"),
-    (1, "run peg_corner --world PB --rendering spread", "rendering = 'spread'"),
     (1, "run peg_corner --set friction", "--set = 'friction': expected path=value"),
-    (1, "run peg_corner --set contact.friction=-1", "contact.friction"),
     (1, "run peg_corner --set contact.frictoin=1", "frictoin"),
     (1, "run peg_corner --set mass=[1", "--set"),
-    (1, "run peg_corner --set bodies.pegg.mass=1", "did you mean peg?"),
     (1, "run peg_corner --out ''", "--out = '': expected a value that is not empty"),
-    (1, "run peg_corner --out=", "--out = '': expected"),
     (1, "run ''", "argument 2 = '': expected a value"),
     (1, "run peg_corner --out /dev/null/folder", "/dev/null/folder: "),
     (1, "inspect no_such_file.h5", "no_such_file.h5: no such file"),
     (1, "inspect .", ".: a folder, not a file"),
-    (1, "inspect notes.h5", "notes.h5"),
-    (1, "store check ''", "argument 3 = ''"),
-    *((1, f"store {action} /", "not a whole file system") for action in ("check", "again")),
-    *((1, f"certify {name}.npz", "no archive") for name in ("text", "empty", "cut")),
+    (1, "store check /", "not a whole file system"),
+    (1, "certify cut.npz", "no archive"),
     (1, "certify half.npz", "mass_matrix, v_plus missing"),
-    (1, "certify whole.npz absent.npz --export hard", "absent"),
-    *(
-        (1, f"certify whole.npz --export {name}", "--export")
-        for name in ("whole.npz", "link.out", "hard.out", ".")
-    ),
+    (1, "certify whole.npz --export link.out", "--export"),
+    (1, "certify whole.npz --export hard.out", "--export"),
     (1, "solvers bare", "a folder with problem files"),
-    (1, "compare peg_corner --worlds ideel", "did you mean ideal?"),
     (1, "solvers --out x.csv", "ends in .json"),
     (1, "compare peg_corner --against best", "against = 'best'"),
     (1, "sweep corner_tlt", "did you mean corner_tilt?"),
-    (1, "prove no_such_statement", "no_such_statement"),
     (1, "prove theorem1", "did you mean theorem_1?"),
     (1, "reproduce --figure fig7", "did you mean fig07?"),
     (1, "reproduce --set contact.friction=0.2", "a figure whose scenes it changes"),
-    (1, "reproduce --figure fig04 --set contact.frictoin=0.2", "friction"),
-    (1, "reproduce --figure what-makes-energy --set contact.friction=0.2", "fig07"),
     (1, "report diff here there", "report = 'here'"),
     (1, "bench --budget 50", "budget = '50': expected a time with its unit, e.g. 50us"),
-    (
-        1,
-        "effects peg_corner --measure --world ideal",
-        "--measure needs a world of the compiled engine",
-    ),
-    *(
-        (1, f"port json:dumps {words}", said)
-        for words, said in (
-            ("--rate 0", "rate = 0.0: expected a finite number above 0"),
-            ("--start 0;1", "--start = '0;1': expected a number, or two or three"),
-            ("--stored -1", "stored = -1.0: expected a finite number, 0 or more"),
-            ("--fastest 0", "fastest = 0.0: expected a finite number above 0"),
-        )
-    ),
+    (1, "effects peg_corner --measure --world ideal", "--measure needs a world of the compiled"),
+    (1, "port json:dumps --start 0;1", "--start = '0;1': expected a number, or two or three"),
     (1, "port own_number:f", "law = 3: expected a function of (x, v)"),
-    (1, "verify --resolver nothing", "package.module:function"),
     (1, "verify --resolver no_such:f", "can be imported"),
-    (
-        1,
-        "verify --resolver json:dumps",
-        "resolver = 'dumps': expected a function called as (mass_matrix, con",
-    ),
-    (
-        1,
-        "verify --resolver iapb:resolve_impct",
-        "which has no resolve_impct; did you mean resolve_impact?",
-    ),
-    *(
-        (1, f"verify --resolver {name}", said)
-        for name, said in (
-            ("omega", "resolver = 'omega'"),
-            (":f", "resolver = ':f'"),
-            ("json:", "resolver = 'json:'"),
-            (".relative:f", "resolver"),
-            ("'a b:c'", "resolver"),
-            ("own_syntax:f", "SyntaxError"),
-            ("own_fault:f", "ZeroDivisionError"),
-            ("own_number:f", "something that can be called"),
-        )
-    ),
+    (1, "verify --resolver iapb:resolve_impct", "did you mean resolve_impact?"),
+    (1, "verify --resolver own_syntax:f", "SyntaxError"),
+    (1, "verify --resolver own_fault:f", "ZeroDivisionError"),
 ]
 
 
@@ -257,60 +194,31 @@ def test_a_figure_of_changed_scenes_says_so_and_leaves_the_papers_figure(answer,
     assert drawings[0] != drawings[1], "the peg is drawn where the value puts it"
 
 
-@pytest.mark.thorough
-def test_a_figure_of_changed_runs_is_drawn_from_them(answer, here):
-    _, made = answer("reproduce", "--figure", "fig13", "--set", "duration=0.05", "--out", "drawn")
-    runs = list((here / "drawn" / "runs").rglob("*.h5"))
-    assert len(runs) == 3 and all(
-        read_run(path).steps_done * read_run(path).dt == pytest.approx(0.05, abs=2e-3)
-        for path in runs
-    )
-    assert made["drawings"]
-
-
 def test_json_has_the_keys_that_the_documents_list_and_an_error_is_an_object_too(answer, here):
     found = {}
     for row, (status, line) in JSON.items():
         ended, found[row] = answer(*line.split())
         assert (row, ended, set(found[row])) == (row, status, listed(row))
     ran = found["run"]
-    seen = answer("inspect", found["run"]["file"], "--impacts", 2)[1]
+    seen = answer("inspect", ran["file"], "--impacts", 2)[1]
     assert len(seen["impacts"]) == min(2, seen["collisions"])
     assert (seen["end"], seen["steps"]) == (ran["end"], ran["steps"])
-    assert {"energy", "effects", "provenance", "run_key", "content_hash"} <= set(seen)
-    assert (
-        found["check"]["limits"]["contacts"] == 2
-        and found["check"]["warnings"][0]["kind"] == "stiffness"
-    )
-    assert found["check"]["warnings"][0].keys() == {"kind", "where", "text"}
+    check = found["check"]
+    assert check["limits"]["contacts"] == 2 and check["warnings"][0]["kind"] == "stiffness"
     ignored = {one["name"]: one["ignores"] for one in found["effects"]["effects"]}
     assert ignored["penalty_stiffness"] == "stiffness"
     assert found["store again"]["same"] == 1 == len(found["store again"]["files"])
     assert len(found["sweep"]["points"]) == 2 == found["sweep"]["new"]
-    assert (Path(found["sweep"]["folder"]) / "points.nc").is_file()
     rows = {row[0]: row for row in found["solvers"]["tables"]["given"]["rows"]}
-    assert set(found["solvers"]["tables"]) == {"given"} and "not read" in rows["bad.lcp"]
-    assert (
-        rows["two.lcp"].count("solved") > 3 and "solved" not in rows["none.lcp"]
-    )  # no z has 0 <= z and -z - 1 >= 0
-    assert found["verify"]["passed"] and [one["law"] for one in found["verify"]["laws"]] == [
-        "kinetic_energy"
-    ]
+    assert "not read" in rows["bad.lcp"] and rows["two.lcp"].count("solved") > 3
+    assert "solved" not in rows["none.lcp"]  # no z has 0 <= z and -z - 1 >= 0
+    assert found["verify"]["passed"] and len(found["verify"]["laws"]) == 1
     assert found["port"]["broken_laws"] == ["bounded"] and Path(found["port"]["map"]).is_file()
     assert [one["verdict"] for one in found["prove"]["statements"]] == ["proved"]
-    drawings = found["reproduce --figure"]["drawings"]
-    assert drawings and all(Path(each).is_file() for each in drawings)
-    status, whole = answer("store", "check", "runs")
-    os.truncate(ran["file"], 5000)
-    assert (status, set(whole), whole["count"]) == (0, {"files", "count"}, {"whole": 1})
-    assert answer("store", "check", "runs")[1]["count"] == {"damaged": 1}
-    for status, line, said in (
-        (1, "run no_such_scene", "no_such_scene"),
-        (2, "run", "scene"),
-        (2, "run peg_corner --speed 3", "No such option"),
-    ):
+    assert all(Path(each).is_file() for each in found["reproduce --figure"]["drawings"])
+    for status, line in ((1, "run no_such_scene"), (2, "run peg_corner --speed 3")):
         ended, error = answer(*line.split())
-        assert ended == error["status"] == status and said in error["error"]
+        assert ended == error["status"] == status and error["error"]
 
 
 def test_debug_shows_the_traceback_ctrl_c_ends_with_130_and_a_fault_of_ours_is_not_hidden(
@@ -329,93 +237,37 @@ def test_debug_shows_the_traceback_ctrl_c_ends_with_130_and_a_fault_of_ours_is_n
         iapb("schema")
 
 
-@pytest.mark.thorough
-@pytest.mark.parametrize(
-    "of_ctrl_c", [signal.SIG_DFL, signal.SIG_IGN], ids=["in front", "in the background"]
-)
-def test_the_signal_that_ends_a_process_politely_keeps_what_was_done(of_ctrl_c, tmp_path):
-    command = [
-        sys.executable,
-        "-m",
-        "reports.cli",
-        "run",
-        "peg_corner",
-        "--world",
-        "ideal",
-        "--set",
-        "duration=600",
-        "--out",
-        str(tmp_path),
-    ]
-    start = partial(signal.signal, signal.SIGINT, of_ctrl_c)
-    short = [word.replace("duration=600", "duration=0.01") for word in command]
-    subprocess.run(short, check=True)  # compiles the kernels
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, preexec_fn=start) as process:
-        time.sleep(LOADED)
-        process.terminate()
-        out, _ = process.communicate(timeout=60)
-    assert (
-        process.returncode == 130
-        and "Stopped: interrupted" in out
-        and len(list(tmp_path.glob("*.partial"))) == 1
-    )
-
-
-def test_every_command_explains_itself_in_the_words_of_the_list(iapb):
+def test_every_command_explains_itself(iapb):
     told = iapb("--help")[1]
-    for command, words in cli.COMMANDS.items():
+    for command in cli.COMMANDS:
         status, out, _ = iapb(command, "--help")
-        name = command.replace("-", "_")
-        explained = getattr(import_module(f"reports.commands.{name}"), name).__doc__
-        assert (
-            status == 0
-            and "Usage" in out
-            and " ".join(explained.partition("\n\n")[0].split()) == words
-            and command in told
-        )
+        assert status == 0 and "Usage" in out and command in told
 
 
-def test_version_scenes_schema_and_completion(iapb, answer, monkeypatch, capsys):
+def test_version_schema_and_completion(iapb, monkeypatch, capsys):
     assert iapb("--version")[:2] == (0, f"iapb {import_module('iapb').__version__}\n")
-    assert answer("scenes")[1]["peg_corner"]
     parts = json.loads(iapb("schema")[1])["$defs"]
     assert all("bodies" in parts[kind]["properties"] for kind in ("Scene", "SpatialScene"))
-    monkeypatch.setenv("_IAPB_COMPLETE", "complete_bash")
-    for words, place, expected in (
-        ("iapb run peg_c", 2, "peg_corner"),
-        ("iapb che", 1, "check"),
-        ("iapb run --wor", 2, "--world"),
-    ):
-        monkeypatch.setenv("COMP_WORDS", words)
-        monkeypatch.setenv("COMP_CWORD", str(place))
-        with pytest.raises(SystemExit, match="0"):  # typer ends the process that a shell asks
-            iapb()
-        assert expected in capsys.readouterr().out.split()
+    for name, value in (("_IAPB_COMPLETE", "complete_bash"), ("COMP_CWORD", "2")):
+        monkeypatch.setenv(name, value)
+    monkeypatch.setenv("COMP_WORDS", "iapb run peg_c")
+    with pytest.raises(SystemExit, match="0"):  # typer ends the process that a shell asks
+        iapb()
+    assert "peg_corner" in capsys.readouterr().out.split()
 
 
 def test_run_stores_a_run_a_second_call_reads_it_and_inspect_tells_what_is_in_it(iapb, tmp_path):
     status, out, _ = iapb("run", *SHORT, "--out", tmp_path)
     [file] = tmp_path.glob("*.h5")
     written = file.stat().st_mtime_ns
-    assert status == 0 and "computed in" in out and str(file) in out
-    assert (
-        "read from its file" in iapb("run", *SHORT, "--out", tmp_path)[1]
-        and file.stat().st_mtime_ns == written
-    )
+    assert status == 0 and str(file) in out
+    assert "read from its file" in iapb("run", *SHORT, "--out", tmp_path)[1]
+    assert file.stat().st_mtime_ns == written
     for more in (("--set", "contact.stiffness=900"), ("--world", "PB"), ("--rendering", "spread")):
         iapb("run", *SHORT, *more, "--out", tmp_path)
     assert len(list(tmp_path.glob("*.h5"))) == 4
     status, out, _ = iapb("inspect", file, "--impacts", "1")
-    for text in (
-        "peg_corner",
-        "Complete.",
-        "The first 1 of",
-        "impact_loss",
-        "friction",
-        "run key",
-        "content hash",
-    ):
-        assert status == 0 and text in out, text
+    assert status == 0 and "The first 1 of" in out and "content hash" in out
 
 
 def test_a_run_that_is_interrupted_diverges_or_is_not_to_be_trusted_says_so(
@@ -431,246 +283,87 @@ def test_a_run_that_is_interrupted_diverges_or_is_not_to_be_trusted_says_so(
     monkeypatch.setattr("reports.commands.run.stage_progress", interrupting)
     status, out, err = iapb("run", "peg_corner", "--out", tmp_path)
     [file] = tmp_path.glob("*.partial")
-    assert (
-        status == 130
-        and str(file) in out
-        and "Stopped: interrupted" in out
-        and "Traceback" not in err
-    )
-    assert not list(tmp_path.glob("*.h5")) and "Partial: interrupted." in iapb("inspect", file)[1]
+    assert status == 130 and f"{file}" in out and "Stopped: interrupted" in out
+    assert "Traceback" not in err and "Partial: interrupted." in iapb("inspect", file)[1]
     monkeypatch.undo()
-    assert (
-        iapb("run", "peg_corner", "--out", tmp_path)[0] == 0
-    )  # done from the start, and the partial file is gone
+    assert iapb("run", "peg_corner", "--out", tmp_path)[0] == 0  # done from the start
     assert len(list(tmp_path.glob("*.h5"))) == 1 and not list(tmp_path.glob("*.partial"))
-    walls = [
-        {"name": f"wall_{n}", "kind": "half_plane", "point": [0.05 * n, 0], "normal": [-n, 0]}
-        for n in (1, -1)
-    ]
-    status, out, _ = iapb(
-        "run",
-        "peg_corner",
-        "--world",
-        "PB",
-        "--set",
-        "contact.stiffness=1e9",
-        "--set",
-        "contact.damping=0",
-        "--set",
-        f"walls={json.dumps(walls)}",
-        "--out",
-        tmp_path,
-    )
-    assert status == 1 and "Stopped: the" in out and "range of numbers" in out
-    wrong = (
-        "run",
-        "peg_corner",
-        "--set",
-        "duration=0.5",
-        "--set",
-        "contact.stiffness=1e8",
-        "--out",
-        tmp_path / "x",
-    )
+    fast = ("run", "peg_corner", "--set", "bodies.peg.velocity=[-0.3, 0.4, 0.0]")
+    fast += ("--set", "couplings.four_channel.stiffness=[1e9, 1e9, 1e9]")
+    status, out, _ = iapb(*fast, "--out", tmp_path)
+    assert status == 1 and "Stopped: the" in out
+    wrong = ("run", *SHORT, "--set", "contact.stiffness=1e8", "--out", tmp_path / "x")
     status, out, err = iapb(*wrong)
-    assert (
-        status == 3
-        and "Warning: contact.stiffness" in err
-        and "not to be trusted, because its energy is" in out
-    )
-    assert (
-        answer(*wrong)[1]["distrust"]
-        and "not to be trusted" in iapb("inspect", *tmp_path.glob("x/*.h5"))[1]
-    )
+    assert status == 3 and "Warning: contact.stiffness" in err
+    assert "not to be trusted, because its energy is" in out and answer(*wrong)[1]["distrust"]
+    assert "not to be trusted" in iapb("inspect", *tmp_path.glob("x/*.h5"))[1]
 
 
-def test_check_says_what_the_step_holds_and_what_a_rigid_world_costs(iapb, answer):
+def test_check_says_what_the_step_holds_and_effects_why_one_is_off(iapb):
     status, out, _ = iapb("check", "peg_corner")
-    assert (
-        status == 0
-        and "the step holds contact.stiffness <= 2.62e+05 N/m" in out
-        and "Nothing wrong" in out
-    )
-    many = [
-        {
-            "name": f"b{i}",
-            "joint": "planar",
-            "mass": 1.0,
-            "inertia": 1e-3,
-            "position": [0.11 * i, 0.05, 0.0],
-            "shapes": [{"kind": "circle", "radius": 0.05}],
-        }
-        for i in range(330)
-    ]
-    base = (
-        "wall_1d",
-        "--set",
-        "hand=null",
-        "--set",
-        "device=null",
-        "--set",
-        "couplings={}",
-        "--set",
-        "walls=[]",
-    )
-    some = (*base, "--set", f"bodies={json.dumps(many[:60])}", "--set", "duration=10")
-    remarks = answer("check", *some, "--world", "ideal")[1]["remarks"]
-    assert any("1,770 contacts of 180 coordinates in each step, about" in said for said in remarks)
-    assert not answer("check", *some)[1]["remarks"]
-    every = (
-        *base,
-        "--set",
-        f"bodies={json.dumps(many)}",
-        "--set",
-        "duration=0.01",
-        "--world",
-        "ideal",
-    )
-    status, found = answer("check", *every)
-    assert status == 3 and "size" in {one["kind"] for one in found["warnings"]}
-    assert iapb("run", *every, "--out", "/nonexistent")[0] == 1
+    assert status == 0 and "the step holds contact.stiffness <= 2.62e+05 N/m" in out
     status, out, _ = iapb("effects", "peg_corner", "--world", "PB")
     assert status == 0 and "the law 'penalty' does not use it" in " ".join(out.split())
 
 
 def test_certify_judges_runs_and_archives_and_exports_them_as_integers(iapb, answer, here):
     iapb("run", "newton_cradle", "--set", "duration=0.4", "--out", "runs")
-    status, out, _ = iapb("certify", "runs", "whole.npz")
-    assert status == 0 and "of 2 files: 0 gained energy (exact)" in out and ".h5" in out
     status, out, _ = iapb("certify", archive(here / "gain.npz", gain=True))
     assert status == 1 and "2 impacts of 1 file: 1 gained energy (exact)" in out
     assert "Impact 1 of" in out and "Fraction" in out
-    np.savez("other.npz", mass_matrix=[[1.0]], v_minus=[[1.5]], v_plus=[[-1.5]])
-    status, found = answer("certify", "runs", "other.npz", "other.npz", "--export", "impacts.txt")
-    assert (
-        status == 0 and found["passed"] and len(found["files"]) == 2
-    )  # what is named twice is judged once
+    status, found = answer("certify", "runs", "whole.npz", "whole.npz", "--export", "impacts.txt")
+    assert status == 0 and found["passed"] and len(found["files"]) == 2  # named twice, judged once
     head, *impacts, end = whole = Path("impacts.txt").read_text(encoding="utf-8").splitlines()
     run = read_run(next(here.glob("runs/*.h5")))
-    assert (
-        head == "iapb impacts 2"
-        and len(impacts) == len(run.impacts.step) + 1 > 1
-        and end == f"end {len(impacts)}"
-    )
-    size, *numbers = map(float, impacts[-1].split())
-    assert size == 1.0 and [
-        m * 2.0**e for m, e in zip(numbers[::2], numbers[1::2], strict=True)
-    ] == [1.0, 1.5, -1.5]
-    d, *numbers = map(int, impacts[0].split())
-    after = [
-        np.ldexp(float(m), e)
-        for m, e in zip(numbers[-2 * d :: 2], numbers[-2 * d + 1 :: 2], strict=True)
-    ]
-    assert after == run.impacts.v_plus[0].tolist()
-    assert iapb("certify", "other.npz", "absent.npz", "--export", "impacts.txt")[0] == 1
-    assert Path("impacts.txt").read_text(encoding="utf-8").splitlines() == whole and not list(
-        here.glob(".*")
-    )
+    assert head == "iapb impacts 2" and end == f"end {len(impacts)}"
+    assert len(impacts) == len(run.impacts.step) + 2 > 2
+    assert iapb("certify", "whole.npz", "absent.npz", "--export", "impacts.txt")[0] == 1
+    assert Path("impacts.txt").read_text(encoding="utf-8").splitlines() == whole
 
 
-def test_bench_names_a_method_for_a_budget_and_prints_its_tables(iapb, answer, monkeypatch):
-    choice = Choice(5e-5, 4, 3, "factored", "all rows", "compiled", 1e-6, 1e-16, 1e-15, 1.0, 1.0)
+def test_bench_names_a_method_for_a_budget_and_prints_its_tables(answer, monkeypatch):
     tables = {"one": Table((Column("x"),), ((1,),))}
-    asked = []
     finding = Finding("cost", "t", "q", "a", REPRODUCED, (Part("s", REPRODUCED),), tables)
     for name, stand_in in (
-        ("which_method", lambda *given: asked.append(given) or (choice,)),
         ("haptic_study", lambda *_: with_failures(finding, [FAILED])),
         ("recommended", lambda _: Table(())),
         ("work_precision", lambda **_: Table((Column("y"),), ((2,),))),
     ):
         monkeypatch.setattr(f"reports.commands.bench.{name}", stand_in)
-    status, found = answer("bench", "--budget", "50us", "--contacts", "7", "--coordinates", "3")
-    assert asked == [(pytest.approx(5e-5), 7, 3)]
-    assert status == 0 and found["choices"][0]["method"] == "factored"
     status, found = answer("bench")
     assert status == 1 and set(found) == listed("bench")
-    assert found["tables"]["one"] == [{"x": 1}] and found["tables"]["methods on problems"] == [
-        {"y": 2}
-    ]
-    assert "Not computed: four contacts: SolverError: no solution" in iapb("bench")[1]
+    tables = found["tables"]
+    assert (tables["one"], tables["methods on problems"]) == ([{"x": 1}], [{"y": 2}])
 
 
 def test_compare_puts_worlds_on_one_page_and_stores_them_with_their_figure(iapb, here):
-    door = (
-        "compare",
-        SLOPE.with_name("door.yaml"),
-        "--set",
-        "duration=0.15",
-        "--worlds",
-        "IAPB",
-        "--against",
-        "IAPB",
-    )
-    status, out, err = iapb(*door, "--impacts", "1")
-    assert status == 0 and max(map(len, out.splitlines())) <= show.WIDTH, err
-    by_solver = {
-        row[0]: row[2:6]
-        for row in map(str.split, out.splitlines())
-        if {"none", "friction"} & set(row)
-    }
+    door = ("compare", SLOPE.with_name("door.yaml"), "--set", "duration=0.15", "--worlds", "IAPB")
+    status, out, err = iapb(*door, "--against", "IAPB", "--impacts", "1")
+    assert status == 0, err
+    rows = map(str.split, out.splitlines())
+    by_solver = {row[0]: row[2:6] for row in rows if {"none", "friction"} & set(row)}
     assert by_solver["lemke"] == by_solver["nsgs"] == ["1", "1", "0", "0"]
     place = Path("mine/slope.json")
-    slope = ("compare", SLOPE, "--set", "duration=0.05", "--worlds")
-    status, out, err = iapb(*slope, "IAPB,ideal,ideal-friction", "--out", place)
+    slope = ("compare", SLOPE, "--set", "duration=0.05", "--worlds", "IAPB,ideal,ideal-friction")
+    status, out, err = iapb(*slope, "--out", place)
     lines = out.splitlines()
     assert status == 0 and max(map(len, lines)) <= show.WIDTH and len(lines) < 60, err
-    assert "Closest to ideal-friction is " in out and f"Stored in {place}" in out
-    found = json.loads(place.read_text(encoding="utf-8"))
-    assert (
-        set(found["tables"]) == {"worlds", "over time"}
-        and len(found["tables"]["over time"]["rows"]) == 3 * 51
-    )
-    assert [row[0] for row in found["tables"]["worlds"]["rows"]] == [
-        "IAPB",
-        "ideal",
-        "ideal-friction",
-    ]
+    found = json.loads(place.read_text(encoding="utf-8"))["tables"]
+    assert len(found["over time"]["rows"]) == 3 * 51
+    assert [row[0] for row in found["worlds"]["rows"]] == ["IAPB", "ideal", "ideal-friction"]
     assert "ideal-friction (reference)" in place.with_suffix(".svg").read_text(encoding="utf-8")
 
 
 def test_tables_and_sentences_fit_a_terminal_and_json_is_strict():
-    wide = titled(
-        ("name", *(f"quantity {k} [N s]" for k in range(12))), [("a", *map(float, range(12)))], 3
-    )
-    lines = show.table_text(wide).splitlines()
-    assert max(map(len, lines)) <= show.WIDTH and lines.count("") == 1
+    titles = ("name", *(f"quantity {k} [N s]" for k in range(12)))
+    lines = show.table_text(titled(titles, [("a", *map(float, range(12)))], 3)).splitlines()
+    assert max(map(len, lines)) <= show.WIDTH
     assert [line for line in lines if line.startswith("a ")][1].split()[-1] == "11"
-    assert lines[1].split()[:4] == ["name", "0", "[N", "s]"]
-    folded = titled(("name", "empty", "why"), [("a", None, "words " * 12), ("b", None, None)])
-    lines = show.table_text(folded).splitlines()
-    assert "empty" not in lines[0] and sum("words" in line for line in lines) == 3
     wrapped = show.sentence("word " * 40, "• ").splitlines()
-    assert (
-        max(map(len, wrapped)) <= show.WIDTH
-        and wrapped[0].startswith("• ")
-        and wrapped[1].startswith("  word")
-    )
-    facts = {
-        "a": np.array([1.0, np.nan]),
-        2: Part("s", REPRODUCED),
-        "c": Path("x"),
-        "d": (np.int64(3), True, None),
-    }
+    assert max(map(len, wrapped)) <= show.WIDTH and wrapped[1].startswith("  word")
+    facts = {"a": np.array([1.0, np.nan]), 2: Part("s", REPRODUCED), "d": (np.int64(3), None)}
     found = json.loads(show.Answer(facts, []).text(json_=True), parse_constant=pytest.fail)
-    assert found["a"] == [1.0, None] and found["2"]["verdict"] == REPRODUCED and found["c"] == "x"
-    assert found["d"] == [3, True, None]
-
-
-def test_a_log_tells_of_a_stage_that_begins_and_of_one_that_goes_on(monkeypatch, capsys):
-    monkeypatch.setattr(show, "SILENCE", 0.01)
-    said = ""
-    with show.stage_progress("known") as tell:
-        tell("known", 3, 3)
-        tell("a stage [with brackets]", 2, 1000)
-        for _ in range(1000):
-            time.sleep(0.01)
-            said += capsys.readouterr().err
-            if said.count("\n") > 1:
-                break
-    assert said.startswith(
-        "a stage [with brackets] ...\na stage [with brackets]: 2 of 1,000 after 0.0 min\n"
-    )
+    assert (found["a"], found["2"]["verdict"], found["d"]) == ([1.0, None], REPRODUCED, [3, None])
 
 
 @pytest.mark.parametrize("term", ["xterm", "dumb"])

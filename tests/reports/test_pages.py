@@ -196,10 +196,7 @@ def test_the_pages_show_the_records_escaped_and_counted():
     for text in (
         "KE never rises &lt;b&gt;",
         "Asked &lt;here&gt;.",
-        "each of the 3 runs",
-        "is on: walls. Without it this run is the same to the last bit.",
         "the position changes by up to 2.5 mm",
-        "is off: none in the scene.",
     ):
         assert text in page, text
 
@@ -210,7 +207,6 @@ def test_the_pages_show_the_records_escaped_and_counted():
         ("at most 2.0e-16 of it", "at most 2.0 · 10<sup>−16</sup> of it"),
         ("e in [-1, 1]", "e in [−1, 1]"),
         ("2005-06", "2005-06"),
-        ("p >= 0 <= q", "p ≥ 0 ≤ q"),
         ("costs 5$ <i>", "costs 5$ &lt;i&gt;"),
     ],
 )

@@ -66,23 +66,19 @@ def only(**tables):
     [
         (0, "gain", 1.5 * (1 + 1e-12), CLOSE),
         (0, "gain", 1.5 * (1 + 1e-8), DIFFERS),
-        (0, "gain", -1.5, DIFFERS),
-        (0, "gain", math.nan, DIFFERS),
-        (1, "gain", 1.0, DIFFERS),
         (2, "gain", -math.inf, DIFFERS),
+        (0, "gain", -1.5, DIFFERS),
         (0, "gain", None, ONLY_OLD),
         (3, "gain", 1.0, ONLY_NEW),
         (0, "median [µs]", 99.0, TIMING),
         (0, "stable", False, DIFFERS),
         (0, "stable", 1, DIFFERS),
         (0, "note", "rank 2 of 4", DIFFERS),
-        (2, "note", "gains 2.50001e-3", DIFFERS),
         (1, "note", "solved", TIMING),
         (4, "gain", 4.4e-16, CLOSE),
         (4, "gain", 1e-11, DIFFERS),
         (0, "sentence", "Gains 2.6e-3 at most.", difference.PROSE, "claims"),
         (0, "outcome", "refuted", DIFFERS, "claims"),
-        (0, "sentence", None, ONLY_OLD, "claims"),
     ],
 )
 def test_a_planted_change_is_found_and_named_through_the_files(change, tmp_path):
@@ -144,43 +140,27 @@ def test_where_times_decide_the_rows_they_are_known_by_what_was_asked():
 
 
 def test_what_keeps_runs_from_repeating_is_named():
-    assert unlike(
-        {"cpu": "a", "sources": "x", "commit": "1"}, {"cpu": "b", "sources": "y", "mujoco": "1"}
-    ) == ("cpu", "sources", "mujoco")
-    one, threads, other = (
-        {"cpu": "a", "blas": f"openblas 0.3 {kernel}", "simd": simd}
-        for kernel, simd in (
-            ("Haswell x2", "AVX2"),
-            ("Haswell x1", "AVX2"),
-            ("SkylakeX x2", "AVX2 X86_V4"),
-        )
-    )
-    assert unlike(one, threads) == () and unlike(one, other) == (
-        "BLAS kernel",
-        "CPU features of numpy",
-    )
+    old = {"cpu": "a", "blas": "openblas 0.3 Haswell x2", "commit": "1"}
+    threads = old | {"blas": "openblas 0.3 Haswell x1", "commit": "2"}
+    kernel = old | {"blas": "openblas 0.3 SkylakeX x2", "cpu": "b", "mujoco": "1"}
+    assert unlike(old, threads) == () and unlike(old, kernel) == ("cpu", "BLAS kernel", "mujoco")
 
 
 def test_the_command_counts_everything_and_ends_with_1_only_where_results_differ(tmp_path, capsys):
-    more = replace(
-        changed(0, "gain", 2.0), runs={"iapb run peg_corner": "d" * 64, "iapb run new": "e"}
-    )
+    more = replace(changed(0, "gain", 2.0), runs={"iapb run peg_corner": "d" * 64, "new": "e"})
     more = replace(more, tables={"claims/C07": more.tables["claims/C07"], "extra": TABLE})
     for name, report in (("a", REPORT), ("b", changed(0, "median [µs]", 99.0)), ("c", more)):
         (tmp_path / name).mkdir()
         write_numbers(tmp_path / name / NUMBERS_NAME, report)
     a, b, c = (str(tmp_path / name) for name in "abc")
     assert cli.main(["report", "diff", a, f"{b}/report.html"]) == 0
-    assert "6 measured times, and what is made from them, are not judged" in capsys.readouterr().out
+    capsys.readouterr()
     assert cli.main(["report", "diff", a, f"{c}/{NUMBERS_NAME}"]) == 1
     said = " ".join(capsys.readouterr().out.split())
     for words in (
         "claims/C07, row 1: factored, gain: 1.5 -> 2.0 (2.5e-01 of it)",
-        "19 numbers and words",
-        "18 are exactly",
-        "1 differ",
-        "Only in the old report: claims.",
-        "Only in the new report: extra.",
+        "Of 19 numbers and words in both reports, 18 are exactly the same",
+        "Only in the old report: claims. Only in the new report: extra.",
         "Of 1 runs behind both, 0 are the same to the last bit; 1 are behind one only.",
     ):
         assert words in said, words
@@ -191,13 +171,8 @@ def test_the_command_counts_everything_and_ends_with_1_only_where_results_differ
     "text",
     [
         "",
-        "[]",
-        "{}",
-        "null",
         '{"format": "other"}',
-        "\x00",
         "[" * 100_000,
-        "not JSON",
         '{"format": "iapb numbers", "format_version": 1, "depth": "q", "runs": {}, "provenance": {}, '
         '"tables": {"t": {"columns": ["a"], "rows": [[1, 2]]}}}',
     ],
@@ -232,10 +207,8 @@ def remade(monkeypatch):
     ("other", "status", "said"),
     [
         (REPORT, 0, "every number was made again"),
-        (changed(0, "median [µs]", 99.0), 0, "every number was made again"),
         (changed(0, "gain", 1.5 + 1e-12), 0, "1 agree within 1e-09"),
         (changed(0, "gain", 1.6), 1, "not every number"),
-        (changed(0, "gain", None), 1, "not every number"),
         (replace(REPORT, tables={}), 1, "not every number"),
         (
             replace(REPORT, runs={"iapb run peg_corner": "d" * 64}),

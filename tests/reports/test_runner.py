@@ -18,7 +18,7 @@ from reports.evidence import energy
 from reports.evidence.runs import FIGURE_RUNS, shipped_scene
 from reports.runner import Runner
 from reports.store import RunStore, content_hash, read_run, write_run
-from reports.uses import parsed, run_command
+from reports.uses import run_command
 from tests.reports.made_up import made_run
 from verification.check import Study
 
@@ -31,28 +31,22 @@ def test_a_finished_run_is_neither_computed_again_nor_overwritten_and_a_partial_
     store = RunStore(tmp_path)
     run = made_run()
     partial = made_run(steps=10, complete=False)
-    label = "peg corner/IAPB"
-    place = store.place_of(INPUTS, label)
+    place = store.place_of(INPUTS, "peg corner/IAPB")
     assert not store.fetch(place, lambda: partial)[0].complete
     assert read_run(place.partial).steps == 10 and not place.path.exists() and store.entries() == ()
     assert store.fetch(place, lambda: run)[0] is run and not place.partial.exists()
     again = RunStore(tmp_path)
     kept, _ = again.fetch(again.place_of(INPUTS, "any"), pytest.fail)
     assert content_hash(kept) == content_hash(run)
-    [path] = tmp_path.glob("*.h5")
-    before = path.read_bytes()
-    assert write_run(path, made_run(seed=2)).read_bytes() == before
+    before = place.path.read_bytes()
+    assert write_run(place.path, made_run(seed=2)).read_bytes() == before
     (tmp_path / "other.h5").write_text("no run")
     [entry] = store.entries()
-    assert (entry.file, entry.title, entry.content_hash) == (
-        path.name,
-        "peg · IAPB",
-        content_hash(run),
-    )
-    path.write_bytes(before[:5000])
-    with pytest.raises(RunFileError, match=path.name):  # damage is reported, and left where it is
-        store.fetch(store.place_of(INPUTS), pytest.fail)
-    assert path.stat().st_size == 5000
+    assert (entry.file, entry.content_hash) == (place.path.name, content_hash(run))
+    place.path.write_bytes(before[:5000])
+    with pytest.raises(RunFileError, match=place.path.name):  # damage is reported, and left there
+        store.fetch(place, pytest.fail)
+    assert place.path.stat().st_size == 5000
 
 
 @pytest.fixture
@@ -151,10 +145,6 @@ def test_a_pasted_command_makes_the_same_run_again(values, world, rendering, sta
 def test_every_scene_and_every_run_of_the_figures_has_a_command_and_a_scene_of_ones_own_its_file(
     tmp_path,
 ):
-    named, numbered = (
-        WHOLE.with_values(parsed([f"{path}=3"])) for path in ("bodies.peg.mass", "bodies[0].mass")
-    )
-    assert named.resolved() == numbered.resolved() != WHOLE.resolved()
     assert all(run_command(load_scene(find_scene(name)), "IAPB") for name in scene_names())
     for scene, values, world, rendering in FIGURE_RUNS.values():
         command = run_command(shipped_scene(scene, values), world, rendering)

@@ -8,9 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
-from iapb.contact.laws import Penalty
-from iapb.errors import ArgumentError, RunFileError
-from reference import worlds
+from iapb.errors import RunFileError
 from reports.cli import main
 from reports.evidence.runs import shipped_scene
 from reports.resimulate import differences, repeat_run
@@ -28,7 +26,7 @@ from reports.store.check import (
     check_store,
 )
 from reports.store.io import sealed
-from reports.store.records import read_record, write_record
+from reports.store.records import write_record
 from reports.store.schema import FORMAT_VERSION, GROUPS, RESULT_GROUPS
 from tests.reports.made_up import made_run
 
@@ -71,24 +69,23 @@ def test_every_kind_of_file_is_told_and_a_damaged_run_is_computed_again_where_it
     write_run(whole.with_name("unfinished.h5.partial"), run)
     (folder / ".x.h5.1.writing").write_bytes(b"half")
     (folder / "text.h5").write_text("no HDF5")
-    (folder / "cut.h5").write_bytes(whole.read_bytes()[:-100])
-    with h5py.File(folder / "other.h5", "w") as file:
-        file["x"] = 1
+    older = write_record(folder / "older.h5", 1, {})
+    with h5py.File(older, "r+") as file:
+        file.attrs["format_version"] = FORMAT_VERSION - 1
+    older.write_bytes(sealed(older.read_bytes()))
     assert {state.path.name: state.state for state in check_store(filled)} == {
         spoilt.name: DAMAGED,
         whole.name: WHOLE,
         "unfinished.h5.partial": PARTIAL,
         ".x.h5.1.writing": LEFTOVER,
         "text.h5": FOREIGN,
-        "other.h5": FOREIGN,
-        "cut.h5": DAMAGED,
+        "older.h5": OTHER,
     }
     assert store("check", filled) == 1 and "Remove a damaged run" in capsys.readouterr().out
     with pytest.raises(RunFileError):
         Runner(folder)(scene, run.world)
     spoilt.unlink()
     assert content_hash(Runner(folder)(scene, run.world)) == content_hash(run) and spoilt.is_file()
-    assert store("check", filled / "nowhere") == 1
     assert store("again", spoilt) == 0 and "the same to the last bit" in capsys.readouterr().out
 
 
@@ -100,10 +97,6 @@ def move(file):
     file["trajectory/q"][2, 1] += 1e-12
 
 
-def retell(file):
-    file["scene/source"][()] = "another scene"
-
-
 def slow_down(file):
     file.attrs["dt"] = 1.0
 
@@ -111,43 +104,26 @@ def slow_down(file):
 @pytest.mark.parametrize(
     ("edit", "state"),
     [
-        (lambda file: None, WHOLE),
         (add_attribute, CHANGED),
-        (move, DAMAGED),
-        (retell, DAMAGED),
         (slow_down, DAMAGED),
         (lambda file: file["steps"].create_dataset("mine", data=1), DAMAGED),
     ],
 )
 def test_what_another_program_writes_into_a_run_is_told_and_an_attribute_does_no_harm(
-    tmp_path, edit, state, capsys
+    tmp_path, edit, state
 ):
     path = tmp_path / "run.h5"
     run = made_run()
     write_run(path, run, provenance={})
     with h5py.File(path, "r+") as file:
         edit(file)
-    (found,) = check_store(path.parent)
-    assert found.state == state
-    if state == WHOLE:
-        assert content_hash(read_run(path)) == content_hash(run)
-        return
-    assert "another process read it" in found.why
+    assert [found.state for found in check_store(tmp_path)] == [state]
     with pytest.raises(RunFileError, match="differs from its seal.*iapb store check"):
         read_run(path)
     assert store("seal", path) == (state == DAMAGED)
-    said = capsys.readouterr().out
-    assert ("attributes were added, the data are whole" in said) == (state == CHANGED)
     if state == CHANGED:
         assert content_hash(read_run(path)) == content_hash(run)
-    assert check_store(path.parent)[0].state == (WHOLE if state == CHANGED else DAMAGED)
-
-
-def test_a_record_survives_an_attribute_too(tmp_path):
-    path = write_record(tmp_path / "table.h5", {"a": 1}, {})
-    with h5py.File(path, "r+") as file:
-        add_attribute(file)
-    assert store("seal", path) == 0 and read_record(path) == {"a": 1}
+    assert check_store(tmp_path)[0].state == (WHOLE if state == CHANGED else DAMAGED)
 
 
 def test_a_file_that_another_program_holds_open_is_not_damaged(tmp_path):
@@ -173,22 +149,6 @@ def test_a_seal_at_the_end_is_of_an_earlier_version(tmp_path):
         read_run(path)
 
 
-@pytest.mark.parametrize("version", [FORMAT_VERSION - 1, FORMAT_VERSION + 1])
-def test_what_another_version_wrote_is_told(filled, version, capsys):
-    others = [runs(filled)[0], write_record(filled / "runs" / "table.h5", 1, {})]
-    for path in others:
-        with h5py.File(path, "r+") as file:
-            file.attrs["format_version"] = version
-        path.write_bytes(sealed(path.read_bytes()))
-    assert store("check", filled) == 0
-    said = capsys.readouterr().out
-    for path in others:
-        assert (
-            f"{path}: other version: its format has version {version}, and this iapb reads" in said
-        )
-    assert store("check", others[0]) == 1
-
-
 @pytest.mark.parametrize("world", ["IAPB", "PB", "ideal", "CBuc", "IAPB-friction"])
 def test_a_run_comes_out_the_same_from_its_own_file(tmp_path, world):
     Runner(tmp_path)(shipped_scene("peg_corner", {"duration": 0.2, "contact.friction": 0.2}), world)
@@ -200,36 +160,16 @@ def test_again_tells_what_differs_and_goes_on_past_what_cannot_be_made_again(fil
     run = read_run(runs(filled)[0])
     energy = {**run.energy, "impact_loss": run.energy["impact_loss"] + 6e-17}
     forged = replace(run, q=run.q + 1e-15, energy=energy)
-    path = write_run(
-        filled / "forged.h5", forged, provenance={"blas": "OpenBLAS of another processor"}
-    )
+    path = write_run(filled / "forged.h5", forged, provenance={"blas": "another"})
     assert [one.name for one in repeat_run(path).differs] == ["trajectory/q", "energy/impact_loss"]
     assert all(0.0 < one.largest < 2e-15 for one in repeat_run(path).differs)
     write_run(filled / "mine.h5", replace(run, law="mine"))
     write_record(filled / "table.h5", 1, {})
     assert store("again", filled) == 1
     said = capsys.readouterr().out
-    assert "forged.h5: differs in\n" in said and "energy/impact_loss: by at most 6e-17 in " in said
-    assert "stored under OpenBLAS of another processor; this is " in said and "table.h5" not in said
-    assert (
-        "mine.h5: not simulated again: law = 'mine'" in said
-        and "2 of 4 runs came out the same." in said
-    )
-
-
-def test_a_law_of_ones_own_is_made_again_where_a_world_has_it(tmp_path, monkeypatch):
-    class Mine(Penalty):
-        name = "springs of mine"
-
-    monkeypatch.setitem(
-        worlds.WORLDS, "mine", lambda rendering: worlds.World("mine", Mine(), "four-channel")
-    )
-    Runner(tmp_path)(shipped_scene("peg_corner", SHORT), "mine")
-    path = next(tmp_path.glob("*.h5"))
-    assert repeat_run(path).same
-    monkeypatch.setattr(Mine, "settings", {"stiffness": "another"})
-    with pytest.raises(ArgumentError, match="springs of mine"):
-        repeat_run(path)
+    assert "energy/impact_loss: by at most 6e-17 in " in said and "table.h5" not in said
+    assert "mine.h5: not simulated again: law = 'mine'" in said
+    assert "2 of 4 runs came out the same." in said
 
 
 def test_everything_of_the_content_hash_is_compared():

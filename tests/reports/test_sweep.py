@@ -59,23 +59,14 @@ def runs(folder):
 
 def test_the_table_has_an_axis_for_each_path_and_says_what_its_runs_say(done):
     found = table(done)
-    assert (
-        found.sizes["world"] == 2
-        and found.energy_lost.shape == (2, 1, 1, 2, 3)
-        and len(runs(done)) == 12
-    )
-    assert found.energy_lost.attrs["units"] == "J" and not found.error.any()
-    elastic = found.sel(
-        {"world": "IAPB", "contact.restitution": 1.0, "bodies.striker.velocity.1": 0.1}
-    )
-    plastic = found.sel(
-        {"world": "IAPB", "contact.restitution": 0.0, "bodies.striker.velocity.1": 0.1}
-    )
-    assert (
-        plastic.energy_lost.item() > 1e-6 > abs(elastic.energy_lost.item()) and elastic.impacts == 1
-    )
+    assert found.energy_lost.dims[0] == "world" and found.energy_lost.shape == (2, 1, 1, 2, 3)
+    assert len(runs(done)) == 12 and not found.error.any()
+    assert found.energy_lost.attrs["units"] == "J"
+    struck = found.sel({"world": "IAPB", "bodies.striker.velocity.1": 0.1})
+    elastic, plastic = (struck.sel({"contact.restitution": e}) for e in (1.0, 0.0))
+    assert abs(elastic.energy_lost.item()) < 1e-6 and elastic.impacts == 1
     run = read_run(done / "small" / "runs" / plastic.file.item())
-    assert run.scene_source and run.world == "IAPB"
+    assert run.world == "IAPB" and plastic.energy_lost == run.impacts.energy_lost.sum() > 1e-6
     assert run.energy["kinetic"][-1] == plastic.kinetic_energy < run.energy["kinetic"][0]
 
 
@@ -101,21 +92,15 @@ def test_a_damaged_or_impossible_point_costs_its_own_row(done, tmp_path, capsys)
     damaged.write_bytes(content[:-100])
     assert sweep(done, "--json") == 1
     told = json.loads(capsys.readouterr().out)
-    assert (
-        told["failed"] == 1
-        and [damaged.name in row["error"] for row in told["points"]].count(True) == 1
-    )
+    assert told["failed"] == 1 == sum(damaged.name in row["error"] for row in told["points"])
     assert int((table(done).error != "").sum()) == 1
     damaged.write_bytes(content)
     assert sweep(done) == 0 and table(done).equals(finished)
-    (tmp_path / "small.yaml").write_text(
-        STUDY.replace("[0, 1]", "[0, 2]").replace("[IAPB, PB]", "[IAPB]")
-    )
+    wrong = STUDY.replace("[0, 1]", "[0, 2]").replace("[IAPB, PB]", "[IAPB]")
+    (tmp_path / "small.yaml").write_text(wrong)
     assert sweep(tmp_path) == 1
-    found = table(tmp_path)
-    for restitution, impacts in ((0.0, False), (2.0, True)):
-        row = found.sel({"contact.restitution": restitution})
-        assert bool(row.impacts.isnull().all()) is impacts
+    right, row = (table(tmp_path).sel({"contact.restitution": e}) for e in (0.0, 2.0))
+    assert not right.impacts.isnull().any() and row.impacts.isnull().all()
     assert "contact.restitution" in row.error.item(0)
 
 
@@ -199,8 +184,7 @@ def test_a_worker_of_another_version_or_without_the_folder_says_so(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        *((f"{name}:", f"{name}x:", f"{name}x") for name in ("scene", "worlds", "values")),
-        ("[0, 1]", "[]", "contact.restitution"),
+        ("worlds:", "worldsx:", "worldsx"),
         ("[0, 1]", "[[0, 1]]", "contact.restitution"),
         ("[0, 1]", f"[{'0, ' * 20_000} 1]", "at most"),
         ("two_discs", "../two_discs.yaml", "scene"),
