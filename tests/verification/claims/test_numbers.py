@@ -1,9 +1,14 @@
 """The numbers of the claims that pages quote: a broken table costs its own numbers alone."""
 
+import pytest
+
 from verification.claims import CLAIMS, peg, walls
 from verification.claims.conditions import Condition
 from verification.claims.numbers import LEFT_OPEN, claim_tables
+from verification.claims.numbers import _limits as limits_of_tilt
+from verification.finding import REFUTED, WHERE, Part, finding_of
 from verification.numbers import NUMBERS
+from verification.region import Region
 
 
 def settling(threshold, ours, theirs):
@@ -61,3 +66,11 @@ def test_a_table_that_lacks_a_column_costs_its_own_numbers_alone():
     found = dict(claim_tables([broken, arm], lost)[NUMBERS].rows)
     assert found["C07 least share"] == 0.5 and "numbers of C15" in {one.case for one in lost}
     assert not any(key.startswith("C15") for key in found)
+
+
+def test_the_limit_of_tilt_is_the_smaller_one_of_x_and_y():
+    ends = (("x", 0.3), ("y", 0.1))
+    parts = [Part("", WHERE, n, region=Region((("tilt", "rad", None, end),))) for n, end in ends]
+    c10 = finding_of("C10", "", "", "", [*parts, Part("", REFUTED, "rotation")])
+    found = limits_of_tilt({"C10": c10})
+    assert found == {"C10 tilt limit deg": pytest.approx(5.73, abs=0.01), "C10 fails": 1}

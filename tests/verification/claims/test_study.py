@@ -9,7 +9,7 @@ from iapb import find_scene, load_scene
 from iapb.errors import ArgumentError
 from reference.worlds import run_world
 from verification.check import Study
-from verification.claims import CLAIMS, check_claims, peg
+from verification.claims import check_claims, peg
 from verification.claims.conditions import Condition, drawn, start_conditions
 from verification.claims.peg import trace
 from verification.finding import NOT_TESTABLE, REFUTED, REPRODUCED, WHERE
@@ -88,18 +88,6 @@ def test_a_limited_device_clips_the_forces_of_both_laws():
     }
     assert forces["PB", 0.2][:2] == pytest.approx([3.0, 3.0]) == forces["IAPB", 0.2][:2]
     assert 3.0 < forces["PB", 1.0][0] < 10.0 < forces["IAPB", 1.0][0]
-
-
-def test_claims_against_rigid_worlds_have_no_friction():
-    for key, rough in (
-        ("C10", False),
-        ("C11", False),
-        ("C12", False),
-        ("C13", False),
-        ("C14", True),
-        ("C15", True),
-    ):
-        assert any(start.friction for start in CLAIMS[key].cases(Study())) is rough
 
 
 def test_regions_that_overlap_share_the_starts_that_confirm_them():
