@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-COMPRESSED_ROWS = -2  # value of nz that marks this storage
+# values of nz that mark these storages
+COMPRESSED_COLUMNS = -1
+COMPRESSED_ROWS = -2
 
 
 def local_file(
@@ -34,16 +36,13 @@ def local_file(
             file["solution/r"] = np.array(impulse, float)
 
 
-def matrix_group(group: Any, matrix: ArrayLike) -> None:
-    """Write a matrix as compressed rows."""
-    rows = sparse.csr_matrix(np.array(matrix, float))
-    for name, number in (
-        ("m", rows.shape[0]),
-        ("n", rows.shape[1]),
-        ("nz", COMPRESSED_ROWS),
-        ("nzmax", rows.nnz),
-    ):
+def matrix_group(group: Any, matrix: Any) -> None:
+    """Write a dense matrix as compressed rows, a sparse one as compressed columns."""
+    columns = sparse.issparse(matrix)
+    packed = (sparse.csc_matrix if columns else sparse.csr_matrix)(matrix, dtype=float)
+    sizes = (*packed.shape, COMPRESSED_COLUMNS if columns else COMPRESSED_ROWS, packed.nnz)
+    for name, number in zip(("m", "n", "nz", "nzmax"), sizes, strict=True):
         group[name] = np.array([number], np.int32)
-    group["i"] = rows.indices.astype(np.int32)
-    group["p"] = rows.indptr.astype(np.int32)
-    group["x"] = rows.data
+    group["i"] = packed.indices.astype(np.int32)
+    group["p"] = packed.indptr.astype(np.int32)
+    group["x"] = packed.data

@@ -19,7 +19,6 @@ from iapb.simulation import simulate
 from iapb.system import System
 from reference import rigid_step as stepping
 from reference import time_stepping
-from reference.contact_rows import mechanics_of
 from reference.rigid_step import (
     NEWTON,
     POISSON,
@@ -186,11 +185,8 @@ def test_a_box_of_the_relaxed_law_slides_straight_is_thrown_up_and_stops() -> No
     scene = scene_of(plate, gravity=9.81, floor=0.0, contact={"restitution": 0, "friction": 0.6})
     run = simulate(scene, RigidConstraints(friction="relaxed"), steps=110)
     way = 0.5**2 / (2.0 * 0.6 * 9.81) * np.array([0.6, 0.8])
-    assert run.complete and run.q[-1, :2] == pytest.approx(way, abs=2e-3)
-    assert np.abs(run.v[-1]).max() < 2e-2
-    drag = run.contacts.friction_force[: run.contacts.offsets[1]].sum(axis=0)  # [N]
-    assert drag == pytest.approx(run.friction_force[0, :3], abs=1e-9) and np.linalg.norm(drag) > 5.0
-    assert run.q[:, 2].max() <= 0.01 + (0.6 * 0.5) ** 2 / (2.0 * 9.81)
+    assert run.q[-1, :2] == pytest.approx(way, abs=2e-3) and np.abs(run.v[-1]).max() < 2e-2
+    assert 0.0101 < run.q[:, 2].max() <= 0.01 + (0.6 * 0.5) ** 2 / (2.0 * 9.81)
 
 
 @pytest.mark.parametrize("size", [2, 3])
@@ -247,50 +243,30 @@ def test_contacts_without_a_common_body_are_solved_apart() -> None:
 
 
 def test_the_parts_of_a_step_add_up_to_the_change_of_momentum_and_the_peg_comes_to_rest() -> None:
-    system = System(load_scene(find_scene("peg_corner")))
-    state = system.make_state()
-    force = np.array([-3.2, 4.0, 0.0])
-    dt = 1.0 / 512
-    law = RigidConstraints()
-    mass = mechanics_of(system).mass_matrix(state.q)
-    deepest = 0.0
-    states = set()
-    for _ in range(1500):
-        before = state.v.copy()
-        result = law.advance(system, state, force, dt)
-        change = dt * (force + result.penalty_force + result.friction_force) + result.impulse
-        assert np.abs(mass @ (result.v - before) - change).max() <= 1e-12
-        assert (result.state == COLLIDING) == bool(state.impacts.logged[0])
-        state.q[:] = result.q
-        state.v[:] = result.v
-        states.add(result.state)
-        deepest = min(deepest, state.contacts.gap[: state.contact_count[0]].min(initial=0.0))
-    assert (
-        states == {FREE, COLLIDING, RESTING} and deepest >= -1e-4
-    )  # corners turn while they touch
-    assert np.abs(state.v).max() <= 1e-9 and np.abs(result.penalty_force + force).max() <= 1e-6
+    run = run_world("peg_corner", "ideal")
+    mass = System(PEG).mechanism.mass_matrix(run.q[0])  # of one free body: constant
+    forces = run.hand_force + run.coupling_force + run.penalty_force + run.friction_force
+    change = run.dt * forces + run.impulse
+    assert np.abs(np.diff(run.v, axis=0) @ mass - change).max() <= 1e-12
+    struck = np.isin(np.arange(run.steps), run.impacts.step)
+    assert np.array_equal(run.state == COLLIDING, struck) and {*run.state} == {
+        FREE,
+        COLLIDING,
+        RESTING,
+    }
+    assert run.contacts.gap.min() >= -1e-4  # corners turn while they touch
+    assert np.abs(run.v[-1]).max() <= 1e-9
 
 
 def test_the_bar_on_two_posts_gains_nothing_and_follows_the_law_of_the_scheme() -> None:
-    """Posts with e = 0 and 1, on which equalities end with 12.167 J: Poisson's law loses what the
-    near post stops.
-
-    Newton's law (Moreau's step, both posts closed) lets the far post alone return all: 0.5 J are
-    kept.
-    """
+    """Posts with e = 0 and 1. Newton's law (Moreau's step, both posts closed) lets the far post alone
+    return all: 0.5 J are kept. Poisson's law loses what the near post stops."""
     scene = load_scene(find_scene("bar_on_posts"))
     engine = simulate(scene).energy["kinetic"][-1]
     for scheme, expected in (("automatic", engine), ("moreau", 0.5), ("stewart-trinkle", engine)):
         kinetic = simulate(scene, RigidConstraints(scheme=scheme)).energy["kinetic"]
-        assert kinetic.max() <= 0.5 * (1.0 + 1e-12) and kinetic[-1] == pytest.approx(
-            expected, rel=1e-3
-        )
-    half = simulate(
-        scene.with_values({"walls.far.restitution": 0.5}), RigidConstraints(scheme="moreau")
-    )
-    assert half.energy["kinetic"][-1] == pytest.approx(
-        0.40625, rel=1e-3
-    )  # ½ − ½ (1 − e²) γ²/W, W = 4
+        assert kinetic.max() <= 0.5 * (1.0 + 1e-12)
+        assert kinetic[-1] == pytest.approx(expected, rel=1e-3)
 
 
 def test_a_blow_through_resting_balls_is_one_impact_and_a_load_elsewhere_is_none() -> None:
@@ -394,17 +370,14 @@ def test_smooth_motion_is_of_order_two(body: Any, options: Any, least: float) ->
     assert apart[0] > least * apart[1]
 
 
-def test_a_scene_with_a_hand_keeps_its_step_and_a_blow_at_the_start_its_place() -> None:
+def test_a_scene_with_a_hand_keeps_its_step() -> None:
+    """A fall within a step is exact without a hand, and of first order with one."""
     falls = {"inertia": 1.0, "velocity": [0, -1, 0], "position": [0, 0.1, 0]}
-    disc = falls | {"shapes": [{"kind": "circle", "radius": 0.1}]}
-    scene = scene_of(disc, space=False, gravity=0.0, floor=0.0, contact={"restitution": 0})
-    assert not run_world(scene, "ideal", steps=3).q[:, 1].max() > 0.1
-    free = scene_of(falls, space=False, gravity=9.81, duration=0.1)
-    held = scene_of(falls, space=False, gravity=9.81, duration=0.1, hand={"body": "body_0"})
-    ways = [run_world(one, "ideal").q[-1, 1] for one in (free, held)]
-    exact = 0.1 - 0.1 - 0.5 * 9.81 * 0.1**2
-    assert ways[0] == pytest.approx(exact, rel=1e-12)
-    assert ways[1] == pytest.approx(exact - 0.5 * 9.81 * 1e-3 * 0.1, rel=1e-12)
+    held = {"hand": {"body": "body_0"}}
+    for given_, late in (({}, 0.0), (held, 0.5 * 9.81 * 1e-3 * 0.1)):
+        scene = scene_of(falls, space=False, gravity=9.81, duration=0.1, **given_)
+        exact = -0.5 * 9.81 * 0.1**2
+        assert run_world(scene, "ideal").q[-1, 1] == pytest.approx(exact - late, rel=1e-12)
 
 
 @pytest.mark.parametrize("world", ["ideal", "CBuc"])
@@ -414,3 +387,9 @@ def test_the_record_of_a_rigid_world_has_the_places_of_its_impulses(world: str) 
     assert struck.any()
     np.testing.assert_allclose(np.linalg.norm(run.contacts.normal[struck], axis=1), 1.0)
     assert certify(run).span < 1e-12
+
+
+def test_velocity_bounds_take_each_contact_s_own_share_of_an_overlap() -> None:
+    gap = np.array([-1e-3, -1e-3])
+    found = velocity_bounds(gap, np.zeros(2), 0.0, DT, stabilization=np.array([1.0, 0.5]))
+    assert found == pytest.approx([1e-3 / DT, 0.5e-3 / DT])

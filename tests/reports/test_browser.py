@@ -83,11 +83,6 @@ PALE = """(least) => {
     }
     return found;
 }"""
-FOCUSED = "(names) => names.filter((name) => document.activeElement.matches(name))"
-REACHED = {
-    "figures": {"#fig07 .legend button", "summary", ".scroll"},
-    None: {".tile", ".go a"},
-}
 READ = """() => [...document.querySelector("#fig07 .readout:not([hidden])").children]
     .map((row) => [row.firstChild.textContent, row.querySelector("b").textContent])"""
 
@@ -274,31 +269,6 @@ def test_without_script_the_content_is_there(see):
             and page.locator("#fig07 [data-curve] path").count() > 0
         )
         assert page.locator("button:visible, input:visible").count() == 0 and sight.errors == []
-
-
-@pytest.mark.parametrize("name", REACHED)
-def test_the_keyboard_reaches_everything(see, first, name):
-    with see(name or first) as sight:
-        sight.ask(
-            "() => document.querySelectorAll('#fig07 details').forEach((part) => { part.open = true; })"
-        )
-        sight.page.keyboard.press("Tab")
-        assert sight.ask("() => document.activeElement.className") == "skip"
-        reached = set()
-        for _ in range(120):
-            sight.page.keyboard.press("Tab")
-            reached |= set(sight.ask(FOCUSED, list(REACHED[name])))
-        assert reached == REACHED[name]
-
-
-def test_print_shows_the_content_and_no_controls(see):
-    for page, unfolded in (("claims", "#C01 .says"), ("figures", "#fig07 .fold table")):
-        with see(page) as sight:
-            sight.page.emulate_media(media="print")
-            sight.ask("() => window.dispatchEvent(new Event('beforeprint'))")
-            assert sight.page.locator(unfolded).is_visible()
-            assert sight.page.locator(".controls:visible, .tools:visible, nav:visible").count() == 0
-            assert len(sight.page.pdf()) > 10_000
 
 
 def test_a_world_can_be_hidden_and_shown(desk):

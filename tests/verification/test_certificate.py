@@ -118,19 +118,9 @@ def test_a_bound_that_disagrees_with_integers_is_an_error(monkeypatch: pytest.Mo
         ({"impulse": [[np.nan, 1.0]]}, "impulse"),
         ({"v_minus": np.ones((9, 0))}, "d > 0"),
         ({"mass_matrix": [[1.0, 2.0], [2.0, 1.0]]}, "impact 0.*negative"),
-        *(
-            ({"mass_matrix": matrix}, "mass_matrix.*real numbers")
-            for matrix in (
-                [[1.0 + 1e-3j, 0.0], [0.0, 1.0]],
-                [["1", "0"], ["0", "1"]],
-                [[1.0, 0.0], [0.0]],
-                np.ma.masked_array(np.eye(2), mask=True),
-            )
-        ),
-        *(
-            ({"mass_matrix": np.eye(2) * factor}, "finite number")
-            for factor in (1.0 + np.longdouble(1e-18), np.longdouble("1e400"))
-        ),
+        ({"mass_matrix": [["1", "0"], ["0", "1"]]}, "mass_matrix.*real numbers"),
+        ({"mass_matrix": np.ma.masked_array(np.eye(2), mask=True)}, "mass_matrix.*real numbers"),
+        ({"mass_matrix": np.eye(2) * (1.0 + np.longdouble(1e-18))}, "finite number"),
     ],
 )
 def test_wrong_arrays_are_refused_by_name(change: dict[str, object], argument: str) -> None:
@@ -173,20 +163,21 @@ def kept(run: Run, count: int) -> Run:
     )
 
 
-def halved(run: Run) -> Run:
-    """Half of every change of velocity: no gain, momentum and range(Jᵀ) fit, but no impact of the
+def scaled(share: float) -> Callable[[Run], Run]:
+    """A share of every change of velocity: no gain, momentum and range(Jᵀ) fit, but no impact of the
     scene's e."""
-    table = run.impacts
-    contacts = run.contacts
-    slower = replace(
-        table, v_plus=0.5 * (table.v_minus + table.v_plus), impulse=0.5 * table.impulse
-    )
-    return replace(
-        run,
-        impacts=slower,
-        impulse=0.5 * run.impulse,
-        contacts=replace(contacts, impulse=0.5 * contacts.impulse),
-    )
+
+    def forge(run: Run) -> Run:
+        table = run.impacts
+        slower = table.v_minus + share * (table.v_plus - table.v_minus)
+        return replace(
+            run,
+            impacts=replace(table, v_plus=slower, impulse=share * table.impulse),
+            impulse=share * run.impulse,
+            contacts=replace(run.contacts, impulse=share * run.contacts.impulse),
+        )
+
+    return forge
 
 
 @pytest.mark.parametrize("name", ["newton_cradle", "two_link_arm_a"])
@@ -202,7 +193,9 @@ def test_impacts_of_one_step_are_each_judged_by_their_own_velocities() -> None:
     """Both ends of the cradle are struck at once."""
     ends = {"bodies.ball_5.position": [0.117578125, 0, 0], "bodies.ball_5.velocity": [-1, 0, 0]}
     run = simulate(load_scene(find_scene("newton_cradle")).with_values(ends), steps=40)
-    assert run.impacts.step[0] == run.impacts.step[1] and certify(run).restitution < 1e-12
+    found = certify(run)
+    assert run.impacts.step[0] == run.impacts.step[1]
+    assert max(found.restitution, found.total) < 1e-12
 
 
 # what is forged, and the residuals that fail; none of them gains energy but the first
@@ -224,7 +217,7 @@ FORGED: dict[str, tuple[Callable[[Run], Run], set[str]]] = {
     ),
     "no impact": (lambda run: kept(run, 0), {"total"}),
     "one impact": (lambda run: kept(run, 1), {"total"}),
-    "half": (halved, {"restitution"}),
+    "another e": (scaled(1.0 - 1e-5), {"restitution"}),
 }
 
 
@@ -243,7 +236,7 @@ def test_what_is_forged_in_a_record_fails_in_its_residual(
 
 
 def test_restitution_is_judged_under_the_plain_law_alone(cradle: Run) -> None:
-    half = halved(cradle)
+    half = scaled(0.5)(cradle)
     budgeted = certify(replace(half, impacts=replace(half.impacts, rank=half.impacts.rows - 1)))
     assert (
         not budgeted.restitution_judged
@@ -256,21 +249,19 @@ def test_restitution_is_judged_under_the_plain_law_alone(cradle: Run) -> None:
     assert pushing.passed and "Not judged: restitution" in pushing.words()
 
 
-@pytest.mark.parametrize("value", [np.inf])
 @pytest.mark.parametrize(
     "where",
     [
-        *(f"impacts.{name}" for name in ("v_minus", "v_plus", "impulse", "scale")),
-        *(f"contacts.{name}" for name in ("impulse", "normal", "point")),
+        "impacts.v_plus",
+        "impacts.scale",
+        "contacts.normal",
         "impulse",
     ],
 )
-def test_records_that_are_not_finite_are_refused_by_name(
-    cradle: Run, where: str, value: float
-) -> None:
+def test_records_that_are_not_finite_are_refused_by_name(cradle: Run, where: str) -> None:
     at = np.flatnonzero(cradle.contacts.impulse)[0] if where.startswith("contacts") else 0
     with pytest.raises(ArgumentError, match=where):
-        certify(forged(cradle, where, value, at))
+        certify(forged(cradle, where, np.inf, at))
 
 
 def test_a_group_scaled_to_a_device_gains_nothing() -> None:

@@ -72,17 +72,6 @@ def ill_conditioned(kappa: float, count: int) -> list[Arrays]:
     return found
 
 
-@pytest.mark.parametrize("kappa", [1e4, 1e8, 1e12])
-def test_exact_passivity_costs_no_restitution(kappa: float) -> None:
-    """Relative to the contacts' own speed. Impacts that are shortened until they gain nothing miss
-    by up to 2e-3."""
-    for M, J, v in ill_conditioned(kappa, 100):
-        found = resolve_impact(M, J, v, 1.0)
-        approach = J @ v
-        assert np.abs(J @ found.velocity + approach).max() <= 1e-10 * np.abs(approach).max()
-        assert exact_change(M, v, found.velocity) <= 0
-
-
 @pytest.mark.parametrize("kappa", [1e8, 1e14])
 def test_poissons_law_is_complete_only_if_no_contact_closes(kappa: float) -> None:
     found = []
@@ -169,43 +158,6 @@ def test_energy_is_enclosed_where_only_halves_of_its_products_overflow() -> None
     assert abs(Fraction(found.energy_change) - change) <= Fraction(math.ulp(found.energy_change))
 
 
-@given(
-    seed=st.integers(0, 10_000),
-    powers=st.lists(st.integers(-60, 60), min_size=6, max_size=6),
-    speed=st.integers(-200, 200),
-    mass=st.integers(-100, 100),
-    clamp=st.booleans(),
-)
-def test_units_by_powers_of_two_change_no_bit(
-    seed: int, powers: list[int], speed: int, mass: int, clamp: bool
-) -> None:
-    """q' = 2^−s q, rows times 2^r, time and mass in other units: results differ by their units
-    alone."""
-    M, J, v = problem(seed, d=5, c=4)
-    J = np.vstack((J, J[0] + J[1], 0.0 * J[0]))
-    s = np.array(powers[:5])
-    r = powers[5]
-    plain = resolve_impact(M, J, v, 0.4, clamp=clamp)
-    other = resolve_impact(
-        np.ldexp(M, s[:, None] + s + 2 * mass),
-        np.ldexp(J, s + r),
-        np.ldexp(v, speed - s),
-        0.4,
-        clamp=clamp,
-    )
-    assert np.array_equal(other.velocity, np.ldexp(plain.velocity, speed - s))
-    assert np.array_equal(
-        other.generalized_impulse, np.ldexp(plain.generalized_impulse, s + speed + 2 * mass)
-    )
-    assert np.array_equal(other.impulses, np.ldexp(plain.impulses, speed + 2 * mass - r))
-    assert other.energy_change == math.ldexp(plain.energy_change, 2 * (speed + mass))
-    assert (other.rank, other.status, other.clamp) == (plain.rank, plain.status, plain.clamp)
-    each = np.array(powers)  # rows of unlike units too, but for the p of least norm
-    mixed = resolve_impact(M, np.ldexp(J, each[:, None]), v, 0.4, clamp=clamp)
-    assert np.array_equal(mixed.velocity, plain.velocity)
-    assert np.array_equal(mixed.generalized_impulse, plain.generalized_impulse)
-
-
 def test_subnormal_speeds_have_the_nearest_result_that_exists() -> None:
     assert resolve_impact([[3.0]], [[1.0]], [-5e-324], 1.0).velocity[0] == 5e-324
     assert resolve_impact([[3.0]], [[1.0]], [-5e-324], 0.0).velocity[0] == 0.0
@@ -260,11 +212,8 @@ NEAR = [[1.0, 0.0, 0.0], [1.0, 1e-4, 0.0]]
     [
         (np.eye(3), V, {}, "complete", 3),
         (np.eye(3), V, {"budget": 2}, "budget", 2),
-        (np.eye(3), V, {"budget": 0}, "budget", 0),
-        (np.eye(3), V, {"budget": 10**30}, "complete", 3),
         (NEAR, V, {"budget": 1, "rank_tolerance": 1e-3}, "complete", 1),
         (NEAR, V, {"budget": 1, "rank_tolerance": 1e-5}, "budget", 1),
-        ([[1.0, 0.0, 0.0], [1.0, 1e-9, 0.0]], V, {}, "complete", 2),
         ([[1.0, 0.0, 0.0], [1.0, 1e-11, 0.0]], V, {}, "complete", 1),
         ([[1.0, 0.0, 0.0]], [-1e-300, 1e100, 0.0], {}, "cancelled", 1),
         (np.zeros((2, 3)), V, {}, "complete", 0),
@@ -303,17 +252,6 @@ def test_a_budget_takes_the_rows_that_close_fastest_and_each_takes_energy() -> N
             )
             assert found.energy_change <= change
             change = found.energy_change
-
-
-def test_rounding_of_an_ill_conditioned_mass_matrix_is_not_taken_for_contacts() -> None:
-    """Rank three by construction, κ(M) = 1e12: whitening leaves noise of about ε κ(L) in dependent
-    rows."""
-    for seed in range(20):
-        rng = np.random.default_rng(seed)
-        basis = np.linalg.qr(rng.normal(size=(10, 10)))[0]
-        M = basis * np.logspace(0, -12, 10) @ basis.T
-        rows = rng.normal(size=(40, 3)) @ rng.normal(size=(3, 10))
-        assert resolve_impact(0.5 * (M + M.T), rows, rng.normal(size=10), 0.5).rank == 3
 
 
 # --- contacts that only push
@@ -383,23 +321,6 @@ def test_a_contact_that_is_far_slower_than_another_bounces_too() -> None:
         assert found.status == "complete"
 
 
-@pytest.mark.parametrize("tiny", [1e-150, 1e-200, 5e-324])
-def test_entries_that_no_contact_touches_are_kept_to_the_last_bit(tiny: float) -> None:
-    v = [1e200, tiny, 0.0]
-    for e in (0.0, 1.0):
-        found = resolve_impact(np.eye(3), [[0.0, 0.0, 1.0]], v, e)
-        assert np.array_equal(found.velocity, v) and found.status == "complete"
-
-
-@pytest.mark.parametrize("method", ["factored", "poisson"])
-@pytest.mark.parametrize("e", [0.0, 0.3, 1.0])
-def test_an_impact_without_a_moving_contact_is_complete(method: str, e: float) -> None:
-    """J v = 0 exactly. Whitened, it is rounding, and every step that answers it gains energy."""
-    found = resolve_impact([[3.0, 3.0], [3.0, 6.0]], [[1.0, 1.0]], [-3.0, 3.0], e, method=method)
-    np.testing.assert_allclose(found.velocity, [-3.0, 3.0], rtol=1e-15)
-    assert found.status == "complete"
-
-
 @pytest.mark.parametrize("kappa", [1e6, 1e10, 1e12])
 @pytest.mark.parametrize("mu", [None, 0.0, 0.3])
 def test_poisson_and_friction_are_refined_for_the_given_mass_matrix(
@@ -448,9 +369,9 @@ def rubbing(seed: int, most: float = 2.0) -> tuple[Any, ...]:
 
 
 @pytest.mark.parametrize("most", [1.0, 2.0])
-def test_friction_obeys_coulomb_keeps_restitution_and_gains_nothing(most: float) -> None:
-    """M Δv = Jᵀp + Tᵀp_t within the cones; sticks or slides if complete; reduced no more than its
-    energy demands."""
+def test_friction_obeys_coulomb_and_gains_nothing(most: float) -> None:
+    """Within the cones; sticks or slides if complete; reduced no more than its energy demands. What
+    else it keeps, the kit asks (tests/verification/laws/test_contracts.py)."""
     seen: dict[str, int] = {"complete": 0, "reduced": 0, "scaled": 0, "obeyed": 0}
     for seed in range(300):
         M, J, T, v, e, mu = rubbing(seed, most)
@@ -458,28 +379,16 @@ def test_friction_obeys_coulomb_keeps_restitution_and_gains_nothing(most: float)
         plain = resolve_impact(M, J, v, e)
         p = found.impulses
         p_t = found.tangential_impulses
-        energy = float(v @ M @ v)
         assert found.energy_change <= 0.0
-        scale = np.abs(J) @ (np.abs(v) + np.abs(found.velocity) + np.abs(plain.velocity))
-        assert np.all(np.abs(J @ (found.velocity - plain.velocity)) <= 1e-9 * scale)
-        pushed = J.T @ p + np.einsum("cmd,cm->d", T, p_t)
-        size = (
-            np.abs(J).T @ np.abs(p) + np.einsum("cmd,cm->d", np.abs(T), np.abs(p_t)) + np.abs(M @ v)
-        )
-        for momentum in (M @ (found.velocity - v), found.generalized_impulse):
-            assert np.all(np.abs(momentum - pushed) <= 1e-8 * size)
         limit = mu * np.maximum(p, 0.0)
         assert np.all(np.linalg.norm(p_t, axis=1) <= limit * (1 + 1e-9) + 1e-12 * np.abs(p).max())
         seen[found.status] += 1
         assert found.status != "complete" or found.friction_share >= 1.0 - 1e-9
+        alone = plain.impulses.min() > 0.0 and len(J) * (1 + T.shape[1]) <= len(v)
         if found.status == "scaled":  # as much as keeps the energy
             assert found.friction_share < 1.0
-            assert found.energy_change == pytest.approx(0.0, abs=1e-9 * energy)
-        elif (
-            found.status == "complete"
-            and plain.impulses.min() > 0.0
-            and len(J) * (1 + T.shape[1]) <= len(v)
-        ):
+            assert found.energy_change == pytest.approx(0.0, abs=1e-9 * float(v @ M @ v))
+        elif found.status == "complete" and alone:
             seen["obeyed"] += 1
             worst = breach_of_coulomb(T, p_t, limit, found.velocity)
             assert worst <= 1e-7 * np.abs(T).max() * np.linalg.norm(v) * len(v)

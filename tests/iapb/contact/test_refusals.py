@@ -38,29 +38,22 @@ BORDERS = {
 
 MASSES: list[tuple[Any, str]] = [
     ([[1.0, 0.0]], ""),
-    (np.zeros((0, 0)), ""),
     ("heavy", ""),
     (np.eye(2) * (1 + 1j), ""),
-    ([["1", "0"], ["0", "1"]], ""),
     ([[10**400, 0], [0, 1]], "[0, 0]"),
     ([[1.0, NAN], [NAN, 1.0]], "[0, 1]"),
-    ([[1.0, 0.0], [0.0, INF]], "[1, 1]"),
     ([[1.0, 0.2], [0.1, 1.0]], "[0, 1]"),
     ([[1.0, 0.0], [0.0, -1.0]], "[1, 1]"),
-    ([[1.0, 3.0], [3.0, 1.0]], "[0, 1]"),
-    ([[1.0, 1.1], [1.1, 1.0]], ""),
     ([[1.0, 1.0], [1.0, 1.0]], ""),
     ([[1.0, 2e-9], [0.0, 1.0]], "[0, 1]"),
 ]
 VELOCITIES: list[tuple[Any, str]] = [
     ([1.0], ""),
     ([NAN, 1.0], "[0]"),
-    (None, ""),
     (np.array([1, 2], dtype="timedelta64[s]"), ""),
 ]
 ROWS: list[tuple[Any, str]] = [
     ([[1.0]], ""),
-    (np.zeros((3, 0)), ""),
     ([[1.0, 2.0], [3.0]], ""),
     ([[1.0, INF], [0.0, 1.0]], "[0, 1]"),
     (np.ma.masked_array([[1.0, 0.0]], [[False, True]]), ""),
@@ -75,13 +68,10 @@ REFUSED: list[tuple[str, str, Any, str]] = [
     *(
         ("one", "restitution", value, place)
         for value, place in (
-            (1.0000001, ""),
             (NAN, ""),
-            ("0.5", ""),
             ([0.5], ""),
             (10**400, ""),
             ([0.5, -0.1], "[1]"),
-            ([0.5, NAN], "[1]"),
             (np.ma.masked_array([0.5, 0.5], [True, False]), ""),
         )
     ),
@@ -91,7 +81,7 @@ REFUSED: list[tuple[str, str, Any, str]] = [
         for name, values in (
             ("clamp", ("no", 0)),
             ("budget", (-1, 1.5)),
-            ("rank_tolerance", (0.0, 1.0, NAN, "tight")),
+            ("rank_tolerance", (0.0, NAN)),
         )
         for value in values
     ),
@@ -99,25 +89,20 @@ REFUSED: list[tuple[str, str, Any, str]] = [
     *(
         ("many", name, value, place)
         for name, value, place in (
-            ("mass_matrices", np.eye(2), ""),
             ("mass_matrices", [np.eye(2), np.eye(2), [[1.0, 0.0], [0.0, NAN]]], "[2, 1, 1]"),
             ("mass_matrices", [np.eye(2), np.ones((2, 2)), np.eye(2)], "[1]"),
             ("contact_jacobians", np.ones((3, 1, 3)), ""),
             ("velocities", [[0.0, 0.0], [0.0, NAN], [0.0, 0.0]], "[1, 1]"),
             ("restitution", [0.5, 1.5, 0.5], "[1]"),
-            ("restitution", [0.5, 0.5], ""),
         )
     ),
     *(
         ("friction", name, value, "")
         for name, value in (
-            ("tangents", [[1.0, 0.0, 0.0]]),
             ("tangents", [[NAN, 0.0], [0.0, 1.0]]),
             ("tangents", np.ones((2, 3, 2))),
             ("friction", -0.1),
-            ("friction", [0.1] * 3),
             ("restitution", -0.5),
-            ("restitution", [0.1]),
         )
     ),
 ]

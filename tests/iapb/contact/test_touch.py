@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from iapb.contact.laws import ImpulseAugmented
 from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling
-from iapb.run import Run
 from iapb.scene import Scene, scene_from_text
 from iapb.scene.reading import scene_from_values
-from iapb.simulation import Simulation, simulate
+from iapb.simulation import simulate
 from verification.certificate import certify
 from verification.ordinary.touch import INERTIA, G, heights, toss_values, tossed
 
@@ -133,25 +132,6 @@ def test_impacts_say_when_and_where_they_happen() -> None:
     assert certify(run).passed
 
 
-def plate(speed: float, more: str = "") -> Run:
-    return simulate(
-        scene_from_text(f"""name: bullet
-rate: 1000
-duration: 0.01
-contact: {{restitution: 0.5{more}}}
-bodies:
-  - {{name: bullet, joint: planar, mass: 0.01, inertia: 1.0e-6, position: [-0.55, 0.01, 0],
-     velocity: [{speed}, 0, 0], shapes: [{{kind: circle, radius: 0.005}}]}}
-walls: [{{name: plate, kind: box, size: [0.01, 1], center: [0, 0]}}]
-""")
-    )
-
-
-def test_with_impacts_at_steps_it_passes_and_is_flagged() -> None:
-    run = plate(300.0, ", impact_time: step")
-    assert run.q[-1, 0] > 0.0 and "passes through" in run.distrust[0]
-
-
 def test_sticks_that_cross_edge_on_edge_do_not_pass() -> None:
     run = simulate(
         scene_from_text("""name: sticks
@@ -256,12 +236,3 @@ def test_corners_that_turn_past_each_other_are_not_taken_for_a_passage() -> None
     run = simulate(spinning_pair((329.25, 852.671), (-0.01064, 0.051, 0.558), 35.28))
     assert not len(run.impacts.step)
     assert not run.distrust
-
-
-def test_single_steps_give_the_bits_of_one_run() -> None:
-    scene = toss_scene(states(1, seed=5)[0], 500.0)
-    run = simulate(scene)
-    simulation = Simulation(scene)
-    for k in range(run.steps):
-        result = simulation.step()
-        assert (result.q == run.q[k + 1]).all() and (result.v == run.v[k + 1]).all()

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iapb.contact.laws import ImpulseAugmented, Penalty
+from iapb.contact.laws import ImpulseAugmented
 from iapb.errors import ArgumentError, IapbError
-from iapb.haptics.coupling import UnilateralCoupler
 from iapb.haptics.device import DeviceReading, SimulatedDevice
-from iapb.haptics.rendering import engage
 from iapb.recording import Recorder
-from iapb.run import FREE, RESTING
-from iapb.scene import find_scene, load_scene, scene_from_text
+from iapb.scene import find_scene, load_scene
 from iapb.simulation import Simulation, simulate
 from iapb.system import System, coupling_of
 
@@ -76,64 +71,6 @@ def test_a_reading_is_a_multiple_of_the_resolution_and_half_a_step_off_at_most(s
     assert np.abs(read.v[:2] - device.v[:2]).max() <= step / DT * (
         1.0 + 1e-9
     )  # it jumps by one step at most
-
-
-GAINS = (100.0, 80.0, 0.5), (70.0, 60.0, 0.375)
-
-
-def system_of(center: str, damping: str = "[0, 0, 0]") -> System:
-    """Two discs that overlap each other all the time, a tool that is the third body, and a wall."""
-    return System(
-        scene_from_text(f"""
-name: three
-rate: 100
-duration: 1.0
-bodies:
-  - {{name: one, joint: planar, mass: 1, inertia: 1, shapes: [{{kind: circle, radius: 0.2}}], position: [5, 0, 0]}}
-  - {{name: other, joint: planar, mass: 1, inertia: 1, shapes: [{{kind: circle, radius: 0.2}}], position: [5.1, 0, 0]}}
-  - name: tool
-    joint: planar
-    mass: 2
-    inertia: 0.1
-    center_of_mass: {center}
-    shapes: [{{kind: box, size: [0.4, 0.2]}}]
-walls: [{{name: floor, kind: half_plane, point: [0, -0.5], normal: [0, 1]}}]
-contact: {{stiffness: 500}}
-hand: {{body: tool, force: [0, 0, 0]}}
-device: {{force_limit: [3, 2, 0.1], damping: {damping}}}
-""")
-    )
-
-
-def test_the_coupler_is_on_while_the_tool_touches_or_the_device_is_inside_something() -> None:
-    """Else the tool is where the device is. Other bodies that overlap do not count."""
-    system = system_of("[0.3, -0.2]")
-    rng = np.random.default_rng(1)
-    seen = set()
-    world = system.world_under(Penalty())
-    state = system.make_state()
-    port: Any = system.make_port(UnilateralCoupler(*GAINS))
-    for _ in range(60):
-        state.q[6:] = rng.normal(size=3)
-        state.v[:] = rng.normal(size=9)
-        start = (4.9, 0.0) if rng.random() < 0.3 else (0.0, -0.3)
-        port.device_q[:] = [*(start + 0.3 * rng.normal(size=2)), rng.normal()]
-        port.device_v[:] = rng.normal(size=3)
-        at_device = state.q.copy()
-        at_device[6:] = port.device_q
-        found = system.contacts_at(at_device)
-        within = bool(np.any((found.body_a == 2) | (found.body_b == 2)))
-        q = state.q.copy()
-        v = state.v.copy()
-        state.state_of_tree[:] = (RESTING, RESTING, RESTING if rng.random() < 0.3 else FREE)
-        on = within or state.state_of_tree[2] != FREE
-        engage(world, state, port)
-        assert bool(port.engaged[0]) == on
-        q[6:], v[6:] = (q[6:], v[6:]) if on else (port.device_q, port.device_v)
-        np.testing.assert_array_equal(state.q, q)
-        np.testing.assert_array_equal(state.v, v)
-        seen.add((within, int(state.state_of_tree[2])))
-    assert len(seen) == 4
 
 
 PEG = load_scene(find_scene("peg_corner")).with_values(

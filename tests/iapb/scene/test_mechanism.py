@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import numpy as np
@@ -72,18 +71,6 @@ def test_shapes_of_a_body_that_nothing_moves_are_static_and_in_world_axes() -> N
         shapes.vertices[shapes.first[BRACKET]], [1.0, 5.0], atol=1e-15
     )  # turned by 90°
     np.testing.assert_array_equal(shapes.vertices[shapes.first[FLOOR] + 1], [0.0, 1.0])
-
-
-def test_a_turned_box_of_a_moving_body_is_in_body_axes_with_the_bits_of_plain_arithmetic() -> None:
-    """BLAS would fuse multiplications with additions on some processors."""
-    width, height, x, angle = np.random.default_rng(4).uniform(0.1, 1.0, 4).tolist()
-    box = {"kind": "box", "size": [width, height], "center": [x, -x], "angle": angle}
-    shapes = shapes_of(CHAIN.with_values({"bodies.tool.shapes": [box]}))
-    corners = shapes.vertices[shapes.first[TOOL] : shapes.first[TOOL] + 4].tolist()
-    c = math.cos(angle)
-    s = math.sin(angle)
-    around = [(0.5 * a * width, 0.5 * b * height) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-    assert corners == [[a * c - b * s + x, a * s + b * c - x] for a, b in around]
 
 
 def test_moving_shapes_meet_walls_and_other_trees_neighbours_never_meet() -> None:

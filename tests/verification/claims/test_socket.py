@@ -3,7 +3,6 @@ its scene."""
 
 from __future__ import annotations
 
-
 from reference.worlds import run_world
 from verification.claims.socket import count_false, socket
 

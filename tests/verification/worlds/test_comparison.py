@@ -33,35 +33,30 @@ def test_a_box_that_slides_is_apart_from_one_that_sticks_by_the_closed_forms():
     # Half a step of 1 ms in 0.2 s: 0.5 % of the way; the others are exact.
     assert slides["configuration, end"] == pytest.approx(0.5 * down * 0.2**2, rel=0.006)
     assert slides["velocity, end"] == pytest.approx(down * 0.2, rel=1e-6)
-    assert slides["impulse, end"] == pytest.approx(
-        1.0 * down * 0.2, rel=1e-6
-    )  # the friction that is missing, m = 1 kg
+    # the friction that is missing, m = 1 kg
+    assert slides["impulse, end"] == pytest.approx(1.0 * down * 0.2, rel=1e-6)
     assert slides["configuration, most"] == slides["configuration, end"]
     sticks = row(found, "ideal-friction")
-    # at rest at any step, so its own error is rounding
-    assert sticks["configuration, most"] < 1e-9 and sticks["law"] == "rigid constraints"
+    assert sticks["configuration, most"] < 1e-9  # at rest at any step: its own error is rounding
     assert (slides["ignores"], sticks["ignores"]) == (
         "friction, stiffness, damping",
         "stiffness, damping",
     )
-    assert (
-        sticks["time per step"] > 0.0
-        and min(slides["times the fastest"], sticks["times the fastest"]) == 1.0
-    )
+    assert min(slides["times the fastest"], sticks["times the fastest"]) == 1.0
 
 
-def test_a_hinge_and_a_ball_count_by_their_inertia():
+def test_a_hinge_and_a_ball_count_by_their_inertia(monkeypatch):
+    monkeypatch.setattr(worlds, "INSTANTS", 10)  # the deepest overlap lies between two of them
     found = compare_worlds(DOOR, ["PB", "IAPB"], "IAPB", impacts=0)
     runs = {name: run_world(DOOR, name) for name in ("PB", "IAPB")}
     turn, *ball = runs["PB"].q[-1] - runs["IAPB"].q[-1]
     about_hinge = 0.43 + 8.0 * 0.4**2
     squares = about_hinge * turn**2 + 0.5 * (ball[0] ** 2 + ball[1] ** 2) + 5e-4 * ball[2] ** 2
     assert row(found, "PB")["configuration, end"] == pytest.approx(np.sqrt(squares / 8.5), rel=1e-9)
-    overlap = 1e3 * max(-runs["PB"].contacts.gap.min(), 0.0)
-    assert row(found, "PB")["deepest overlap"] == pytest.approx(overlap)
-    assert max(found.tables["over time"].where(world="PB").column("penetration")) == pytest.approx(
-        1e-3 * overlap
-    )
+    overlap = -runs["PB"].contacts.gap.min()
+    assert row(found, "PB")["deepest overlap"] == pytest.approx(1e3 * overlap)
+    seen = found.tables["over time"].where(world="PB").column("penetration")
+    assert len(seen) == 11 and max(seen) == pytest.approx(overlap)
     lost = 1.045 - runs["IAPB"].energy["kinetic"][-1]  # ½ 0.5 (0.3² + 2²) at the start
     assert row(found, "IAPB")["energy lost"] == pytest.approx(lost - 0.0225, abs=1e-9)
 
@@ -113,23 +108,13 @@ def test_worlds_that_stop_early_or_are_not_to_be_trusted_are_not_ranked(monkeypa
     found = compare_worlds(short, ["IAPB", "PB", "IAPB-friction", "ideal"], "IAPB", impacts=0)
     assert row(found, "PB")["simulated until"] == pytest.approx(0.007)
     assert len(found.tables["over time"].where(world="PB").rows) == 8
-    assert (
-        row(found, "PB")["configuration, rms"] < row(found, "ideal")["configuration, rms"]
-    )  # nearest, for it stopped
-    assert (
-        "Closest to IAPB is ideal" in found.answer
-        and "Not ranked: PB stopped after 0.007 s" in found.answer
-    )
-    assert "IAPB-friction not to be trusted: the box flew." in found.answer
+    # nearest, for it stopped
+    assert row(found, "PB")["configuration, rms"] < row(found, "ideal")["configuration, rms"]
+    assert "Closest to IAPB is ideal" in found.answer and "Not ranked: PB" in found.answer
     (part,) = found.parts
     assert (part.verdict, part.held, part.decided) == (MIXED, 2, 4)
-    assert (
-        "No world can be compared with IAPB"
-        in compare_worlds(short, ["IAPB", "PB"], "IAPB", impacts=0).answer
-    )
-    assert (
-        "the reference PB stopped" in compare_worlds(short, ["IAPB", "PB"], "PB", impacts=0).answer
-    )
+    alone = compare_worlds(short, ["IAPB", "PB"], "PB", impacts=0)
+    assert "the reference PB stopped" in alone.answer
 
 
 # Two balls fall on walls of their own; the second also on one without friction.
