@@ -92,38 +92,32 @@ def damaged_bytes(content, other, rng):
 
 
 def damaged_text(sample, other, rng):
-    """Return the text with tokens put in, lines and words lost, moved or repeated, or the end of
-    another text."""
+    """Return a text with words, lines or characters changed; one in ten, and what is compressed, as
+    bytes."""
     packed = b"\x1f\x8b"  # the first bytes of what is compressed
     if sample.startswith(packed) or rng.random() < 0.1:
         return damaged_bytes(sample, other, rng)
-    text = sample.decode()
-    other = "" if other.startswith(packed) else other.decode()
+    lines = sample.decode().split("\n")
     for _ in changes(rng):
-        at = int(rng.integers(len(text) + 1))
-        lines = text.split("\n")
-        line, to = (int(rng.integers(len(lines))) for _ in range(2))
-        words = lines[line].split(" ")
-        words[int(rng.integers(len(words)))] = token = str(chosen(rng, TOKENS))
-        shifted = (
-            " " * int(rng.integers(1, 4)) + lines[line]
-            if rng.random() < 0.5
-            else lines[line].lstrip()
-        )
-        text = chosen(
+        k = int(rng.integers(len(lines)))
+        line = lines[k]
+        at = int(rng.integers(len(line) + 1))
+        words = line.split(" ")
+        words[int(rng.integers(len(words)))] = str(chosen(rng, TOKENS))
+        lines[k : k + 1] = chosen(
             rng,
             [
-                text[:at] + token + text[at:],
-                text[:at] + text[at + int(rng.integers(1, 30)) :],
-                text[:at] + chr(int(rng.integers(1, 0xD7FF))) + text[at:],
-                text[:at] + other[int(rng.integers(len(other) + 1)) :],
-                "\n".join([*lines[:line], " ".join(words), *lines[line + 1 :]]),
-                "\n".join([*lines[:line], shifted, *lines[line + 1 :]]),
-                "\n".join(lines[:line] + lines[line + 1 :]),
-                "\n".join([*lines[:to], lines[line], *lines[to:]]),
+                [" ".join(words)],
+                [line[:at] + chr(int(rng.integers(1, 0xD7FF))) + line[at:]],
+                [line[:at]],
+                [" " + line],
+                [line.lstrip()],
+                [],
+                [line, chosen(rng, lines)],
             ],
         )
-    return text.encode()
+        lines = lines or [""]
+    return "\n".join(lines).encode()
 
 
 def damaged_values(sample, other, rng):
