@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +18,7 @@ from iapb.haptics.coupling import FourChannel
 from iapb.haptics.device import SimulatedDevice
 from iapb.scene import load_scene
 from iapb.simulation import simulate
+from reports.store.keys import content_hash
 
 SCENES = Path(__file__).parents[2] / "scenes"
 STEPS = 150  # of each scene: the first impacts are among them
@@ -28,23 +28,23 @@ GAINS = FourChannel((100.0, 100.0, 0.5), (70.0, 70.0, 0.375))
 def hashes() -> dict[str, str]:
     """Return two hashes for each scene's run, as shipped and with implicit contact, and one for
     each kind of impact."""
-    found = {path.stem: _run_hash(load_scene(path)) for path in sorted(SCENES.glob("*.yaml"))}
+    found = {}
     for path in sorted(SCENES.glob("*.yaml")):
-        scene = load_scene(path).with_values({"contact.forces": "implicit"})
-        found[f"implicit {path.stem}"] = _run_hash(scene)
-    found["coupled peg"] = _run_hash(load_scene(SCENES / "peg_corner.yaml"), coupling=GAINS)
+        scene = load_scene(path)
+        implicit = scene.with_values({"contact.forces": "implicit"})
+        for name, one in ((path.stem, scene), (f"implicit {path.stem}", implicit)):
+            found[name] = content_hash(simulate(one, steps=min(STEPS, one.steps)))
+    peg = load_scene(SCENES / "peg_corner.yaml")
+    found["coupled peg"] = content_hash(simulate(peg, steps=STEPS, coupling=GAINS))
     found["device"] = _device_hash()
-    answers = [resolve_impact(M, J, v, 0.5) for M, J, v in _impacts()]
-    found["factored"] = _hash([(answer.velocity, answer.impulses) for answer in answers])
-    poisson = [resolve_impact(M, J, v, np.arange(len(J)) / 16.0) for M, J, v in _impacts()]
-    found["poisson"] = _hash([(answer.velocity, answer.impulses) for answer in poisson])
+    plain = [resolve_impact(M, J, v, 0.5) for M, J, v in _impacts()]
+    plain += [resolve_impact(M, J, v, np.arange(len(J)) / 16.0) for M, J, v in _impacts()]
     rough = [
         resolve_frictional_impact(M, J, np.roll(J, 1, axis=1), v, 0.5, 0.25)
         for M, J, v in _impacts()
     ]
-    found["friction"] = _hash(
-        [(answer.velocity, answer.impulses, answer.tangential_impulses) for answer in rough]
-    )
+    answers = [array for one in (*plain, *rough) for array in (one.velocity, one.impulses)]
+    found["impacts"] = _hash([*answers, *(one.tangential_impulses for one in rough)])
     return found
 
 
@@ -69,31 +69,8 @@ def _device_hash() -> str:
     return _hash([device.q, device.v])
 
 
-def _run_hash(scene: Any, **options: Any) -> str:
-    run = simulate(scene, steps=min(STEPS, scene.steps), **options)
-    return _hash(
-        [getattr(run, field.name) for field in fields(run) if not field.name.startswith("chunk_")]
-    )
-
-
-def _hash(value: Any) -> str:
-    digest = hashlib.sha256()
-    _add(digest, value)
-    return digest.hexdigest()[:16]
-
-
-def _add(digest: Any, value: Any) -> None:
-    if isinstance(value, np.ndarray):
-        digest.update(value.tobytes())
-    elif isinstance(value, dict):
-        _add(digest, [item for pair in value.items() for item in pair])
-    elif isinstance(value, list | tuple):
-        for item in value:
-            _add(digest, item)
-    elif is_dataclass(value):
-        _add(digest, [getattr(value, field.name) for field in fields(value)])
-    else:
-        digest.update(repr(value).encode())
+def _hash(arrays: list[Any]) -> str:
+    return hashlib.sha256(b"".join(array.tobytes() for array in arrays)).hexdigest()
 
 
 if __name__ == "__main__":

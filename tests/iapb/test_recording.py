@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,31 +17,13 @@ from iapb.scene import find_scene, load_scene
 from iapb.simulation import INTERRUPTED, Simulation, simulate
 from iapb.system import coupling_of
 from iapb.thinning import Thinned
+from reports.store.keys import results_of
 
 STEPS = 300
 
 
-def results_of(record, place="run"):
-    """Every array of a run, its tables and its ledger, by place; timings left out."""
-    found = {}
-    for field in fields(record):
-        value = getattr(record, field.name)
-        if is_dataclass(value):
-            found |= results_of(value, field.name)
-        elif isinstance(value, dict):
-            found |= {
-                f"{field.name}/{key}": each
-                for key, each in value.items()
-                if isinstance(each, np.ndarray)
-            }
-        elif isinstance(value, np.ndarray) and not field.name.startswith("chunk"):
-            found[f"{place}/{field.name}"] = value
-    return found
-
-
 def assert_same(first: Run, second: Run) -> None:
-    ours = results_of(first)
-    theirs = results_of(second)
+    ours, theirs = (dict(results_of(run)) for run in (first, second))
     assert ours.keys() == theirs.keys()
     for name, values in ours.items():
         assert np.array_equal(values, theirs[name]), name

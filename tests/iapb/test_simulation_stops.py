@@ -13,7 +13,7 @@ from iapb.haptics.coupling import FourChannel
 from iapb.run import FREE, Run
 from iapb.scene import find_scene, load_scene
 from iapb.simulation import INTERRUPTED, Simulation, simulate
-from tests.iapb.test_recording import results_of
+from reports.store.keys import results_of
 
 PEG = load_scene(find_scene("peg_corner")).with_values(
     {"bodies.peg.position": [0.0209, -0.0141, 0.08], "contact.friction": 0.1}
@@ -50,7 +50,7 @@ def assert_readable(run: Run, steps: int) -> None:
         run.contacts.gap
     )
     assert np.all(run.impacts.step < steps)
-    for name, values in results_of(run).items():
+    for name, values in results_of(run):
         assert np.all(np.isfinite(values)), name
 
 
