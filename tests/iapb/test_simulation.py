@@ -101,12 +101,16 @@ def test_the_compiled_loop_records_what_each_step_from_python_does_bit_for_bit(
 
 
 @pytest.mark.parametrize("coupling", COUPLINGS)
-def test_a_law_written_in_python_is_run_and_recorded_as_the_compiled_one(coupling):
+def test_a_law_written_in_python_is_run_and_recorded_as_the_compiled_one(coupling, monkeypatch):
     chosen = coupling_of(PEG, coupling)
     ours = simulate(PEG, Wrapped(), chosen, steps=STEPS)
     theirs = simulate(PEG, steps=STEPS, coupling=chosen)
     assert (ours.kernel, theirs.kernel) == ("python", "compiled")
     assert_same(ours, theirs)
+    monkeypatch.setattr(recording, "_PIECE", 1)  # each chunk is a piece
+    monkeypatch.setattr(recording, "_STEPS_PER_CHUNK", 60)
+    thin = (simulate(PEG, law, chosen, steps=STEPS, every=7) for law in (Wrapped(), None))
+    assert_same(*thin)
 
 
 def test_a_subclass_with_a_step_of_its_own_is_not_run_as_the_engines_law():

@@ -135,9 +135,12 @@ def test_whatever_decides_the_records_is_in_the_name_of_their_file(tmp_path, mon
     assert stages_of_claims == set(topics.CLAIM_STAGES) <= set(topics.plans())
     monkeypatch.setattr(depends, "BESIDE", tmp_path)
     found = [depends.depends_of("complementarity")]
-    for text in ("one", "two"):
-        (tmp_path / "robots").mkdir(exist_ok=True)
-        (tmp_path / "robots" / "case.txt").write_text(text)
+    case = tmp_path / "robots" / "case.txt"
+    for name, text in (("case.txt", "one"), ("case.txt", "two"), ("renamed.txt", "two")):
+        case.parent.mkdir(exist_ok=True)
+        case.unlink(missing_ok=True)
+        case = case.with_name(name)
+        case.write_text(text)
         found.append(depends.depends_of("complementarity"))
         assert depends.depends_of("complementarity" + topics.AHEAD) == found[-1]
     made = [Stage(tmp_path, "a", int, "quick", one) for one in found]
@@ -147,9 +150,14 @@ def test_whatever_decides_the_records_is_in_the_name_of_their_file(tmp_path, mon
         made.append(Stage(tmp_path, "a", int, "quick"))
     assert len({stage.path for stage in made}) == len(made)
     monkeypatch.setattr(keys, "scene_folder", lambda: tmp_path)
+    monkeypatch.setattr(keys, "_ROOT", tmp_path)
+    monkeypatch.setattr(keys, "sources_hash", lambda folder: folder)
     versions = [keys.evidence_version.__wrapped__()]
-    (tmp_path / "peg.yaml").write_text("name: peg")
-    assert keys.evidence_version.__wrapped__() not in versions
+    (tmp_path / "verification").mkdir()
+    for path in (tmp_path / "peg.yaml", tmp_path / "verification" / "case.xml"):
+        path.write_text("name: peg")
+        versions.append(keys.evidence_version.__wrapped__())
+    assert len(set(versions)) == 3
 
 
 def test_another_blas_kernel_is_another_machine_and_other_threads_are_not():

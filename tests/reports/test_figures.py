@@ -19,8 +19,10 @@ from reports.figures.condition_map import condition_map
 from reports.figures.corner import UNLIMITED
 from reports.figures.figure import draw
 from reports.figures.geometry import body_placements, is_spatial, solids
+from reports.figures.hard_cases import _map_of
 from reports.figures.paper import arm_energies
-from reports.figures.style import LOOKS, STYLES, VARIABLES
+from reports.figures.plot import Plot
+from reports.figures.style import LOOKS, OUTCOMES, STYLES, VARIABLES
 from tests.reports.made_up import made_motion
 from verification.check import Study
 from verification.complementarity.agreement import TWO_CONTACTS
@@ -258,11 +260,21 @@ def test_figure_3_has_the_energies_that_follow_from_the_geometry():
             np.testing.assert_allclose(lost, share * lost[0], atol=1e-13)
 
 
-def test_a_map_counts_what_holds_and_keeps_the_numbers_of_its_axes():
+def test_a_map_counts_what_holds_and_keeps_the_numbers_of_its_axes(monkeypatch):
+    marks = []
+    monkeypatch.setattr(Plot, "marks", lambda plot, found, look, **how: marks.append((look, found)))
     table = replace(titled(("x", "y"), [(0, 0), (1e-3, 0), (1e-3, 0)]), holds=(True, False, True))
     panel = condition_map("m", "t", "c", table, "x", "y").panels[0]
     assert "2 of 3" in panel.alt and "0.001" in re.findall(r">([\d.]+)</text>", panel.svg)
-    assert not re.search(r'="[^"]*\d\.\d{3}', panel.svg)  # coordinates are rounded
+    crossed = [found for look, found in marks if look == OUTCOMES["fails"]]
+    assert crossed == [[(1.0, 0.0)]] and len(marks) == 3  # a full dot, a smaller one
+
+
+def test_what_no_case_of_a_method_map_tried_is_not_called_stable():
+    rows = [("a", "IAPB", "stable"), ("b", "IAPB", "stable"), ("b", "svd", "failed")]
+    made = _map_of([dict(zip(("case", "method", "outcome"), row, strict=True)) for row in rows])
+    easy = ElementTree.fromstring(made).findall(".//tr")[2]
+    assert ["".join(cell.itertext()) for cell in easy.iter("td")] == ["✓", "·"]
 
 
 @pytest.mark.parametrize("name", scene_names())

@@ -173,6 +173,13 @@ def test_a_scheduler_that_dies_or_is_not_there_is_told_in_one_sentence(tmp_path)
     assert 1 <= kept < 50
 
 
+def test_the_energy_lost_is_that_of_all_impacts(tmp_path):
+    scene = load_scene(find_scene("newton_cradle")).with_values({"contact.restitution": 0.5})
+    row = simulate_point(scene, tmp_path, code_version(), {"world": "IAPB"})
+    lost = read_run(tmp_path / row["file"]).impacts.energy_lost
+    assert len(lost) > 1 and row["energy_lost"] == lost.sum() > lost[0] > 0.0
+
+
 def test_a_worker_of_another_version_or_without_the_folder_says_so(tmp_path):
     scene = load_scene(find_scene("two_discs"))
     point = {"world": "IAPB"}

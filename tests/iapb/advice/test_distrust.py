@@ -58,9 +58,11 @@ def run_of(*bodies: Any, walls: Any = (), steps: int = 6, **given: Any) -> Run:
 
 
 def fallen(height: float = 0.01, **values: Any) -> Run:
-    """A box that falls on a floor."""
+    """A box that falls on a floor, with a larger one on top."""
     shape = {"kind": "box", "size": [SIDE, SIDE]}
-    crate = body("box", shape, [0, 0.5 * SIDE + height], [], mass=1.0) | {"inertia": SIDE**2 / 6.0}
+    roof = {"kind": "box", "size": [3 * SIDE, 3 * SIDE], "center": [0, 2 * SIDE]}
+    crate = body("box", shape, [0, 0.5 * SIDE + height], [], mass=1.0)
+    crate |= {"inertia": SIDE**2 / 6.0, "shapes": [shape, roof]}
     floor = {"name": "floor", "kind": "half_plane", "point": [0, 0], "normal": [0, 1]}
     return run_of(
         crate, walls=[floor], steps=200, gravity=[0, -9.81], contact={"forces": "paper"} | values
@@ -276,6 +278,14 @@ PASSAGES: dict[str, tuple[list[Any], list[Any], str]] = {
     ),
     "balls": (
         [body("a", BALL, [-0.1, 0, 0], [30, 0, 0]), body("b", BALL, [0.1, 0.004, 0], [-30, 0, 0])],
+        [],
+        "a passes through b",
+    ),
+    "a small ball, a large one": (
+        [
+            body("a", BALL, [-0.1, 0, 0], [30, 0, 0]),
+            body("b", BALL | {"radius": 0.04}, [0.1, 0.03, 0], [-90, 0, 0]),
+        ],
         [],
         "a passes through b",
     ),

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from verification.impacts import Floats
+from verification.impacts import Floats, draw_rows, draw_velocity
 from verification.laws import check_passivity, sound_resolver
 
 Condition = Callable[[Floats, Floats, Floats, Any], bool]
@@ -53,3 +53,13 @@ def test_every_unsound_resolver_is_found(name: str) -> None:
     laws = ["kinetic_energy", "restitution"] if name in CONDITIONS else None
     report = check_passivity(resolver, impacts=impacts, search=0, laws=laws)
     assert not report.passed and report.broken_laws, report
+
+
+def test_rows_and_velocities_are_what_their_kinds_say() -> None:
+    rng = np.random.default_rng(0)
+    mass = np.eye(4)
+    opposed, _ = draw_rows(rng, "opposed", mass, 6)
+    assert np.array_equal(opposed[:3], -opposed[3:])
+    for kind, least, most in (("unseen", -1.0, 1e-15), ("grazing", 1e-12, 1e-7)):
+        v = draw_velocity(rng, kind, mass, opposed[:2])
+        assert least < np.abs(opposed[:2] @ v).max() < most

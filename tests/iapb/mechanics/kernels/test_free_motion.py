@@ -68,6 +68,7 @@ CASES = {
     "a floating robot": scene(*ROBOT),
     "a planar one": scene(*FLAT_ROBOT),
 }
+LIMITED = scene(FLAT_ROBOT[0], *(link | {"joint_limits": [-0.3, 0.3]} for link in FLAT_ROBOT[1:]))
 
 
 def momenta(run: Run, given: Scene) -> np.ndarray:
@@ -88,3 +89,10 @@ def test_both_momenta_are_kept_to_rounding_and_the_energy_nearly(name: str) -> N
     assert np.abs(kinetic / kinetic[0] - 1.0).max() < (
         1e-12 if "robot" in name or "planar" in name else 1e-6
     )
+
+
+def test_stops_between_two_links_keep_both_momenta() -> None:
+    run = simulate(LIMITED)
+    found = momenta(run, LIMITED)
+    assert len(run.impacts.step) > 1
+    np.testing.assert_allclose(found, found[:1].repeat(len(found), axis=0), atol=1e-9)
