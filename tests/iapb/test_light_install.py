@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from iapb import lazy
 from iapb.errors import EXTRAS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -123,11 +122,3 @@ def test_a_foreign_package_of_the_same_name_is_named(name: str, own: str, tmp_pa
             f"{foreign} hides the package {ROOT / name}" in done.stderr
             and "Rename yours" in done.stderr
         )
-
-
-def test_a_linked_folder_of_ours_hides_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "link").symlink_to(ROOT)
-    monkeypatch.setattr(lazy, "__file__", str(tmp_path / "link" / "iapb" / "lazy.py"))
-    assert lazy.hidden_package() == ""

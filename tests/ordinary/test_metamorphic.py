@@ -1,5 +1,5 @@
 """What may not change a motion: the order and names of bodies and walls, a turn, a mirror, the place,
-the unit of length, a wall given twice or in two parts, a far body, the plane given as a part of
+the unit of length, a wall given twice, a far body, the plane given as a part of
 space.
 
 Each ordinary scene of free bodies is run once as it is and once changed. The change is undone on the
@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 from iapb.run import Run
 from iapb.scene import scene_from_text
 from iapb.simulation import simulate
-from verification.ordinary.scenes import CASES, FLOOR
+from verification.ordinary.scenes import CASES
 
 Values = dict[str, Any]
 
@@ -215,16 +215,6 @@ def twice(values: Values) -> Values:
     }
 
 
-def in_two(values: Values) -> Values:
-    """The floor as two blocks that join below the first body."""
-    seam = values["bodies"][0]["position"][0] + 0.013
-    blocks = [
-        {"name": f"block{k}", "kind": "box", "size": [100, 1], "center": [seam + x, -0.5]}
-        for k, x in enumerate((-50.0, 50.0))
-    ]
-    return values | {"walls": blocks + [wall for wall in values["walls"] if wall != FLOOR]}
-
-
 def beside(mass: float) -> Callable[[Values], Values]:
     """A body that never touches anything."""
 
@@ -258,7 +248,6 @@ SAME = Place()
 CHANGES: dict[str, tuple[Callable[[Values], Values], Place, float]] = {
     "reordered and renamed": (reordered, SAME, 1e-6),
     "each wall twice": (twice, SAME, 1e-4),
-    "floor in two": (in_two, SAME, 1e-6),
     "a light body far away": (beside(1e-3), SAME, 0.0),
     "a heavy body far away": (beside(1e6), SAME, 0.0),
     "turned by a right angle": (as_it_is, Place(angle=math.pi / 2.0), 1e-6),
@@ -276,13 +265,11 @@ def plain() -> dict[str, Run]:
 
 
 def means_something(name: str, change: str) -> bool:
-    """Whether a change can be made: blocks replace the floor of a plane, space has no polygons, and
+    """Whether a change can be made: space has no polygons, and
     numbers of a scene are at most 1e9."""
     values = CASES[name].scene
     (how, _, _) = CHANGES[change]
     space = values.get("dimensions") == 3
-    if how is in_two:
-        return not space and FLOOR in values.get("walls", [])
     if how is in_space:
         shapes = [shape for body in values["bodies"] for shape in body["shapes"]]
         return not space and all(shape["kind"] != "polygon" for shape in shapes)

@@ -281,14 +281,6 @@ PASSAGES: dict[str, tuple[list[Any], list[Any], str]] = {
         [],
         "a passes through b",
     ),
-    "a small ball, a large one": (
-        [
-            body("a", BALL, [-0.1, 0, 0], [30, 0, 0]),
-            body("b", BALL | {"radius": 0.04}, [0.1, 0.03, 0], [-90, 0, 0]),
-        ],
-        [],
-        "a passes through b",
-    ),
     "balls that miss": (
         [body("a", BALL, [-0.1, 0, 0], [30, 0, 0]), body("b", BALL, [0.1, 0.0101, 0], [-30, 0, 0])],
         [],

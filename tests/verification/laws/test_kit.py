@@ -147,21 +147,6 @@ def test_every_pasted_test_fails_on_its_resolver_and_passes_on_a_sound_one(
     )
 
 
-def test_gains_beyond_sixty_decades_are_judged() -> None:
-    """The kit itself raised on them, and called a right answer with an entry of 1e-70 wrong."""
-    for power in (100, 300):
-        report = check_passivity(
-            lambda M, J, v, e, power=power: v * 10.0**power, impacts=3, search=20
-        )
-        assert not report.passed and "the law itself raised" not in report
-
-    def tiny(M: Any, J: Any, v: Any, e: Any) -> Any:
-        found = resolve_impact(M, J, v, e).velocity
-        return np.where((found == 0.0) & v.any(), 1e-70, found)
-
-    assert check_passivity(tiny, impacts=60, laws=["kinetic_energy"]).passed
-
-
 def test_the_exact_law_sees_gains_that_no_double_can_hold() -> None:
     """Relative to KE⁻ they are above 1.8e308, which raised, or below 5e-324, which passed."""
     report = check_passivity(

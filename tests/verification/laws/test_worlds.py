@@ -3,13 +3,14 @@ refused."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from runpy import run_path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from iapb.engines import run_of_states
 from iapb.errors import ArgumentError
 from iapb.run import Run
 from iapb.scene import Scene
@@ -20,48 +21,35 @@ from verification.laws.worlds import judge_world
 HERE = "tests.verification.laws.test_worlds"
 
 
-class Flight:
-    """Free motion by semi-implicit Euler, without contact."""
+EXAMPLE = Path(__file__).parents[3] / "examples" / "own_engine.py"
+Springs: Any = run_path(str(EXAMPLE))["Springs"]
 
-    name = "flight"
-    settings: dict[str, Any] = {}
-    # factors of gravity and of the reported velocity
-    field = 1.0
-    reported = 1.0
+
+class Flight(Springs):
+    """The engine of the example without its springs."""
+
+    settings = {"substeps": 1}
 
     def ignored(self, scene: Scene) -> tuple[str, ...]:
         return ("hand",) * (scene.hand is not None)
 
-    def run(
-        self,
-        scene: Scene,
-        steps: int | None = None,
-        progress: Callable[[int, int], None] | None = None,
-    ) -> Run:
-        system = System(scene)
-        mechanism = system.mechanism
-        q, v = system.start
-        places = [q]
-        rates = [v]
-        for _ in range(steps or scene.steps):
-            force = -mechanism.bias(q, v) - self.field * mechanism.gravity(q, system.gravity)
-            v = v + scene.step * np.linalg.solve(mechanism.mass_matrix(q), force)
-            q = mechanism.integrate(q, v, scene.step)
-            places.append(q)
-            rates.append(v)
-        return run_of_states(scene, self, np.array(places), self.reported * np.array(rates))
+    def push(self, system: System, q: np.ndarray) -> np.ndarray:
+        return np.zeros(system.mechanism.nv)
 
 
 class Backwards(Flight):
     """Reports the velocity of the motion back."""
 
-    reported = -1.0
+    def run(self, *given: Any) -> Run:
+        made: Run = super().run(*given)
+        return replace(made, v=-made.v)
 
 
 class Rising(Flight):
     """Everything falls upwards."""
 
-    field = -1.0
+    def push(self, system: System, q: np.ndarray) -> np.ndarray:
+        return np.asarray(2.0 * system.mechanism.gravity(q, system.gravity))
 
 
 def broken(engine: str) -> set[str]:
