@@ -47,29 +47,40 @@ def cases(count):
 
 
 def drawn(rng):
-    """Return a random scene, with a device that its hand may have, and a law."""
+    """Return a random scene with overlapping bodies, and a device at a joint of any kind."""
     values = dict((draw_spatial_scene if rng.random() < 0.7 else draw_scene)(rng, STEPS).values)
-    values["contact"] |= {"forces": str(rng.choice(["implicit", "paper"]))}
+    forces = str(rng.choice(["implicit", "paper"]))
+    values["contact"] = values["contact"] | {"forces": forces}
     values["integrator"] = str(rng.choice(["momentum", "semi_implicit_euler"]))
-    kind = str(rng.choice(JOINTS["dimensions" in values]))
-    freedoms = {"free_flyer": 6, "planar": 3, "spherical": 3}.get(kind, 1)
     space = "dimensions" in values
-    tool = values["bodies"][0] | {"joint": kind, "position": [], "velocity": [0.3] * freedoms}
-    if kind == "prismatic" or space and kind in ("continuous", "revolute"):
+    kind = str(rng.choice(JOINTS[space]))
+    d = {"free_flyer": 6, "planar": 3, "spherical": 3}.get(kind, 1)
+    tool = {
+        "name": "tool",
+        "joint": kind,
+        "mass": 0.5,
+        "velocity": [0.3] * d,
+        "inertia": [1e-3, 2e-3, 2.5e-3] if space else 1e-3,
+        "center_of_mass": [0.01] * (2 + space),
+        "shapes": [{"kind": "sphere" if space else "circle", "radius": 0.3}],
+    }
+    if kind in ("continuous", "prismatic", "revolute") and (space or kind == "prismatic"):
         tool["axis"] = [0.0, 1.0, 0.0][: 2 + space]
-    values["bodies"] = [tool | {"name": "tool"}, *values["bodies"]]
+    values["bodies"] = [*values["bodies"], tool]
     values["hand"] = {"body": "tool", "force": [1.0] * (6 if space else 3)}
-    gains = {"stiffness": [50.0] * freedoms, "damping": [1.0] * freedoms}
+    gains = {"stiffness": [50.0] * d, "damping": [1.0] * d}
     values["couplings"] = {"four_channel": gains, "unilateral": gains}
     values["device"] = {
-        "position_resolution": [1e-3] * freedoms,
+        "position_resolution": [1e-3] * d,
         "delay": int(rng.integers(0, 3)),
-        "force_limit": [2.0] * freedoms,
+        "force_limit": [2.0] * d,
+        "damping": [0.1] * d,
     }
     scene = scene_kind(values).model_validate(values)
-    law = ImpulseAugmented(rendering=str(rng.choice(RENDERINGS)))
-    chosen = law if rng.random() < 0.7 else Penalty()
-    return scene, chosen, str(rng.choice(["none", "four-channel", "unilateral"]))
+    law = (
+        ImpulseAugmented(rendering=str(rng.choice(RENDERINGS))) if rng.random() < 0.7 else Penalty()
+    )
+    return scene, law, str(rng.choice(["none", "four-channel", "unilateral"]))
 
 
 def program(*words, **environment):
