@@ -46,6 +46,7 @@ ROUGH = PEG.with_values({"contact.friction": 0.3})
 HALF_SMOOTH = ROUGH.with_values({f"walls.{PEG.walls[0].name}.friction": 0.0})
 BARE = PEG.with_values({"couplings": {}})
 LIMITED = PEG.with_values({"device.force_limit": [1, 1, 1]})
+SPREAD = ImpulseAugmented(rendering="spread")
 PER_BODY = ROUGH.with_values({"contact.self_collision_rows": "per_body"})
 GAINS = FourChannel((5.0, 6.0, 7.0), (1.0, 1.0, 1.0))
 DRIFTING = SimpleNamespace(name="drifting")  # a law that says nothing of joints
@@ -78,7 +79,7 @@ CHOSEN: list[tuple[str, Scene, tuple[Any, ...], bool, str, str]] = [
     ),
     ("coupling", PEG, (None, GAINS), True, "four-channel", ""),
     ("coupling", BARE, (), False, "no gains under couplings", ""),
-    ("device_limits", LIMITED, (None, "none", "spread"), True, "'spread'", ""),
+    ("device_limits", LIMITED, (SPREAD, NoCoupling()), True, "'spread'", ""),
     ("coupling", BARE, (None, GAINS), True, "[5, 6, 7]", ""),
     (
         "gravity",
