@@ -6,7 +6,7 @@ out.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
 from math import degrees, isfinite
 from typing import Any
@@ -20,6 +20,7 @@ from verification.numbers import Values, value_tables
 from verification.table import Table, table_from
 
 MILLI = 1e3
+TILTED = 0.05  # [rad]: three degrees
 LEFT_OPEN = "left open"  # name of the table
 Claims = Mapping[str, Finding]
 
@@ -70,96 +71,86 @@ def _limits(claims: Claims) -> dict[str, Any]:
     }
 
 
-def _mean_of(rows: Sequence[Mapping[str, Any]], key: str) -> float | None:
-    return float(np.median([row[key] for row in rows])) if rows else None
+def _median(rows: Table, key: str) -> float | None:
+    return float(np.median(rows[key])) if rows.rows else None
+
+
+def _median_mm(rows: Table, key: str) -> float | None:
+    """Return the median of a length [mm]."""
+    median = _median(rows, key)
+    return None if median is None else MILLI * median
+
+
+def _told(name: str, rows: Table) -> dict[str, int]:
+    """Return in how many trials a part holds, and how many can tell."""
+    return {f"{name} held": sum(rows.decided), f"{name} told": len(rows.decided)}
 
 
 def _bouncing(table: Table) -> Values:
     """Return the sums of bounces at each collision threshold from the same starts."""
-    found: dict[str, Any] = {}
-    for speed_, rows in by_threshold(table, peg.FEWER).items():
-        name = f"{MILLI * speed_:g} mm/s"
-        found[f"C15 bounces at {name}"] = int(sum(row["IAPB"] for row in rows))
-        found[f"C15 bounces of the spring at {name}"] = int(sum(row["PB"] for row in rows))
-        found[f"C15 starts at {name}"] = len(rows)
+    found = dict[str, int]()
+    for speed, rows in by_threshold(table, peg.FEWER).items():
+        name = f"{MILLI * speed:g} mm/s"
+        found[f"C15 bounces at {name}"] = int(sum(rows["IAPB"]))
+        found[f"C15 bounces of the spring at {name}"] = int(sum(rows["PB"]))
+        found[f"C15 starts at {name}"] = len(rows.rows)
     return found
 
 
-def by_threshold(table: Table, part: str) -> dict[float, list[dict[str, Any]]]:
+def by_threshold(table: Table, part: str) -> dict[float, Table]:
     """Return the rows of C15 by collision threshold, of the starts that were tried at each."""
-    rows = [
-        row
-        for row in table.records()
-        if row["part"].startswith(part)
-        and row["friction"] == 0.0
-        and row["travel"] == Condition().travel
-    ]
-    thresholds = sorted({row["collision_threshold"] for row in rows})
-    grid: dict[float, list[dict[str, Any]]] = {one: [] for one in thresholds}
-    for row in rows:
-        grid[row["collision_threshold"]].append(row)
-    return grid
+    same = table.where(friction=0.0, travel=Condition().travel)
+    rows = same.only(name.startswith(part) for name in same["part"])
+    thresholds = sorted(set(rows["collision_threshold"]))
+    return {one: rows.where(collision_threshold=one) for one in thresholds}
 
 
 def _path(table: Table) -> Values:
-    """Return what C10 says at our start, at small tilts, and of pushing only."""
-    start = Condition()
-    ours = table.where(tilt=start.tilt, clearance=start.clearance, travel=start.travel)
+    """Return what C10 says at larger thresholds, and of pushing only."""
     pushing = table.where(part=f"{peg.NEARER}, {peg.ALL_THREE}")
-    moving = [row for row in pushing.records() if not row["ideal settles"]]
-    tilted = [row for row in pushing.records() if row["tilt"] > 0.05]
-    found: dict[str, Any] = {
-        f"C10 {world} {name} at our start": MILLI * ours.where(part=name).records()[0][world]
-        for world in peg.WORLDS
-        for name in ("x", "y")
-    }
-    found |= {
+    moving = pushing.where(**{"ideal settles": False})
+    tilted = pushing.only(tilt > TILTED for tilt in pushing["tilt"])
+    return {
         "C10 pushing nearer": pushing.holds.count(True),
         "C10 pushing told": len(pushing.decided),
         "C10 starts": len(pushing.rows),
-        "C10 rigid peg moves on": len(moving),
-        "C10 IAPB moves on": sum(not row["IAPB settles"] for row in moving),
-        "C10 spring moves on": sum(not row["PB settles"] for row in moving),
-        "C10 pushing moves on": sum(not row[f"{peg.PUSHING} settles"] for row in moving),
-        "C10 tilted IAPB mm": _mean_of(tilted, "IAPB"),
-        "C10 tilted pushing mm": _mean_of(tilted, peg.PUSHING),
-        "C10 tilted spring mm": _mean_of(tilted, "PB"),
+        "C10 rigid peg moves on": len(moving.rows),
+        "C10 IAPB moves on": moving["IAPB settles"].count(False),
+        "C10 spring moves on": moving["PB settles"].count(False),
+        "C10 pushing moves on": moving[f"{peg.PUSHING} settles"].count(False),
+        "C10 tilted IAPB mm": _median_mm(tilted, "IAPB"),
+        "C10 tilted pushing mm": _median_mm(tilted, peg.PUSHING),
+        "C10 tilted spring mm": _median_mm(tilted, "PB"),
+        **_told("C10 x larger threshold", table.where(part=f"x, {peg.LARGER}")),
+        **_told("C10 y larger threshold", table.where(part=f"y, {peg.LARGER}")),
     }
-    for key in [key for key in found if key.startswith("C10 tilted") and found[key] is not None]:
-        found[key] *= MILLI
-    for threshold in (False, True):
-        for name in ("x", "y"):
-            rows = table.where(part=f"{name}, {peg.LARGER}" if threshold else name)
-            kind = "larger threshold" if threshold else "paper's threshold"
-            found[f"C10 {name} {kind} held"] = sum(rows.decided)
-            found[f"C10 {name} {kind} told"] = len(rows.decided)
-    return found
 
 
 def _forces(table: Table) -> Values:
     """Return the median ratio of first pushes, in x and y, and how often torques are nearest."""
-    ratio = _ratios(table.where(part=peg.LARGE).records())
     turned = table.where(part=f"{peg.CLOSEST}, {peg.LARGER}", coordinate="rotation")
     return {
-        "C11 ratio": ratio,
-        "C11 rotation larger threshold held": sum(turned.decided),
-        "C11 rotation larger threshold told": len(turned.decided),
+        "C11 ratio": _ratio(table.where(part=peg.LARGE)),
+        **_told("C11 rotation larger threshold", turned),
     }
 
 
-def _ratios(rows: Iterable[Mapping[str, Any]]) -> float | None:
+def _ratio(table: Table) -> float | None:
+    """Return the median ratio of IAPB's peak forces to those of the spring, in x and y."""
     found = [
-        row["IAPB"] / row["PB"] for row in rows if row["coordinate"] != "rotation" and row["PB"]
+        row["IAPB"] / row["PB"]
+        for row in table.records()
+        if row["coordinate"] != "rotation" and row["PB"]
     ]
     return float(np.median(found)) if found else None
 
 
 def _depths(table: Table) -> Values:
-    rows = table.where(coordinate=peg.PENETRATION, force_limit=1.0).records()
+    plain = table.where(coordinate=peg.PENETRATION, force_limit=1.0)
     small = table.only(tilt <= Condition().tilt for tilt in table["tilt"])
     return {
-        "C13 IAPB mm": MILLI * float(np.median([row["IAPB"] for row in rows])),
-        "C13 spring mm": MILLI * float(np.median([row["PB"] for row in rows])),
+        "C13 IAPB mm": _median_mm(plain, "IAPB"),
+        "C13 spring mm": _median_mm(plain, "PB"),
         "C13 small tilts x": sum(small.where(coordinate="x").decided),
         "C13 small tilts y": sum(small.where(coordinate="y").decided),
         "C13 small tilts": len(small.where(coordinate="x").rows),
@@ -167,9 +158,9 @@ def _depths(table: Table) -> Values:
 
 
 def _limited(table: Table) -> Values:
-    tight = table.only(row["force_limit"] < 1.0 for row in table.records())
+    tight = table.only(limit < 1.0 for limit in table["force_limit"])
     return {
-        "C14 ratio": _ratios(table.where(force_limit=1.0).records()),
+        "C14 ratio": _ratio(table.where(force_limit=1.0)),
         "C14 tight limit open": tight.holds.count(None),
         "C14 tight limit trials": len(tight.rows),
     }
@@ -192,12 +183,9 @@ def _losses(table: Table) -> Values:
 
 def _sockets(table: Table) -> Values:
     both = table.where(part=socket.BOTH)
-    found: dict[str, Any] = {}
-    for name, far in (("covering", True), ("short", False)):
-        rows = both.only((reach >= 1.0) is far for reach in both[socket.REACH])
-        found[f"C18 {name} held"] = sum(rows.decided)
-        found[f"C18 {name} told"] = len(rows.decided)
-    return found
+    covering = both.only(reach >= 1.0 for reach in both[socket.REACH])
+    short = both.only(reach < 1.0 for reach in both[socket.REACH])
+    return _told("C18 covering", covering) | _told("C18 short", short)
 
 
 def _leaks(table: Table) -> Values:
@@ -209,31 +197,28 @@ def _leaks(table: Table) -> Values:
 
 
 def _walls(table: Table) -> Values:
-    """Return how many walls each law settles, at its best damping, and how many one law alone."""
-    found: dict[str, Any] = {}
-    for against in (walls.SAME_DAMPING, walls.EQUAL_GAIN, walls.BOTH):
-        rows = table.where(against=against, test=walls.SETTLES).records()
-        ours, theirs = (
-            [isfinite(row[f"{law} after"]) for row in rows]
-            for law in ("impulses settle", "penalty settles")
-        )
-        found |= {
-            f"C21 {against} impulses": sum(ours),
-            f"C21 {against} springs": sum(theirs),
-            f"C21 {against} impulses only": sum(
-                a and not b for a, b in zip(ours, theirs, strict=True)
-            ),
-            f"C21 {against} springs only": sum(
-                b and not a for a, b in zip(ours, theirs, strict=True)
-            ),
-        }
+    """Return how many walls each law settles, and how many one law settles sooner."""
+    same, best = (_settled(table, against) for against in (walls.SAME_DAMPING, walls.BOTH))
     sooner = table.where(against=walls.BOTH, test=walls.SOONER)
-    found |= {
+    return {
+        f"C21 {walls.SAME_DAMPING} impulses only": sum(a and not b for a, b in same),
+        f"C21 {walls.BOTH} impulses": sum(ours for ours, _ in best),
+        f"C21 {walls.BOTH} springs": sum(theirs for _, theirs in best),
         "C21 walls": len(sooner.rows),
         "C21 sooner impulses": sum(sooner.decided),
         "C21 sooner springs": len(sooner.decided) - sum(sooner.decided),
     }
-    return found
+
+
+def _settled(table: Table, against: str) -> list[tuple[bool, bool]]:
+    """Return for each wall whether impulses settle it, and whether springs do."""
+    rows = table.where(against=against, test=walls.SETTLES)
+    return [
+        (isfinite(ours), isfinite(theirs))
+        for ours, theirs in zip(
+            rows["impulses settle after"], rows["penalty settles after"], strict=True
+        )
+    ]
 
 
 def _almost(table: Table) -> Values:
@@ -258,8 +243,7 @@ def _shares(table: Table) -> Values:
 
 
 def _clipping(table: Table) -> Values:
-    rows = table.where(measure=peg.SETTLING, part=peg.MOST)
-    return {"C12 settling held": sum(rows.decided), "C12 settling told": len(rows.decided)}
+    return _told("C12 settling", table.where(measure=peg.SETTLING, part=peg.MOST))
 
 
 NUMBERS_OF: dict[str, Callable[[Table], Values]] = {
@@ -283,47 +267,52 @@ NUMBERS_OF: dict[str, Callable[[Table], Values]] = {
 def left_open(claims: Claims) -> Iterator[dict[str, Any]]:
     """Yield what changes with a value that the paper does not give: IAPB beside the spring."""
     if "C15" in claims:
-        table = claims["C15"].tables["C15"]
-        settles = by_threshold(table, peg.SETTLES)
-        for speed_, rows in by_threshold(table, peg.FEWER).items():
-            yield {
-                "left open": "collision threshold",
-                "value": MILLI * speed_,
-                "unit": "mm/s",
-                "measured": f"bounces in {len(rows)} runs",
-                "IAPB": sum(row["IAPB"] for row in rows),
-                "spring": sum(row["PB"] for row in rows),
-            }
-            yield {
-                "left open": "collision threshold",
-                "value": MILLI * speed_,
-                "unit": "mm/s",
-                "measured": "median time to rest [s]",
-                "IAPB": _mean_of(settles.get(speed_, []), "IAPB"),
-                "spring": _mean_of(settles.get(speed_, []), "PB"),
-            }
+        yield from _by_threshold(claims["C15"].tables["C15"])
     if "C10" in claims:
-        table = claims["C10"].tables["C10"].where(part=f"{peg.NEARER}, {peg.ALL_THREE}")
-        for tilt in TILTS["quick"]:
-            rows = table.where(tilt=tilt).records()
-            if not rows:
-                continue
+        yield from _by_tilt(claims["C10"].tables["C10"])
+    if "C21" in claims:
+        yield from _by_damping(claims["C21"].tables["C21"])
+
+
+def _by_threshold(table: Table) -> Iterator[dict[str, Any]]:
+    settles = by_threshold(table, peg.SETTLES)
+    for speed, rows in by_threshold(table, peg.FEWER).items():
+        value = {"left open": "collision threshold", "value": MILLI * speed, "unit": "mm/s"}
+        yield value | {
+            "measured": f"bounces in {len(rows.rows)} runs",
+            "IAPB": sum(rows["IAPB"]),
+            "spring": sum(rows["PB"]),
+        }
+        rests = settles.get(speed, rows.only(()))
+        yield value | {
+            "measured": "median time to rest [s]",
+            "IAPB": _median(rests, "IAPB"),
+            "spring": _median(rests, "PB"),
+        }
+
+
+def _by_tilt(table: Table) -> Iterator[dict[str, Any]]:
+    pushing = table.where(part=f"{peg.NEARER}, {peg.ALL_THREE}")
+    for tilt in TILTS["quick"]:
+        rows = pushing.where(tilt=tilt)
+        if rows.rows:
             yield {
                 "left open": "tilt of the start",
                 "value": degrees(tilt),
                 "unit": "°",
                 "measured": "median distance from the rigid wall [mm]",
-                "IAPB": MILLI * float(np.median([row["IAPB"] for row in rows])),
-                "spring": MILLI * float(np.median([row["PB"] for row in rows])),
-                "IAPB, pushing only": MILLI * float(np.median([row[peg.PUSHING] for row in rows])),
+                "IAPB": _median_mm(rows, "IAPB"),
+                "spring": _median_mm(rows, "PB"),
+                "IAPB, pushing only": _median_mm(rows, peg.PUSHING),
             }
-    if "C21" in claims:
-        table = claims["C21"].tables["C21"]
-        for against in (walls.SAME_DAMPING, walls.EQUAL_GAIN, walls.BOTH):
-            rows = table.where(against=against, test=walls.SETTLES).records()
-            yield {
-                "left open": f"damping of the spring: {against}",
-                "measured": f"walls that settle, of {len(rows)}",
-                "IAPB": sum(isfinite(row["impulses settle after"]) for row in rows),
-                "spring": sum(isfinite(row["penalty settles after"]) for row in rows),
-            }
+
+
+def _by_damping(table: Table) -> Iterator[dict[str, Any]]:
+    for against in (walls.SAME_DAMPING, walls.EQUAL_GAIN, walls.BOTH):
+        settled = _settled(table, against)
+        yield {
+            "left open": f"damping of the spring: {against}",
+            "measured": f"walls that settle, of {len(settled)}",
+            "IAPB": sum(ours for ours, _ in settled),
+            "spring": sum(theirs for _, theirs in settled),
+        }
