@@ -18,11 +18,10 @@ from verification.certificate import certify
 from verification.check import Check, Study, Topic
 from verification.finding import Part, attempt
 from verification.laws import LAWS
-from verification.laws.bulk import GAIN, NO_CLAMP, PRINTED, TABLE, ours
+from verification.laws.bulk import GAIN, PRINTED, TABLE, ours
 from verification.laws.topic import CAUGHT, COUNTEREXAMPLES, LAW_TABLE
 from verification.numbers import Values
 from verification.scenes.books import OPEN
-from verification.scenes.ledger import GAIN as SCENE_GAIN
 from verification.scenes.ledger import SCENES, WORTH_NAMING
 from verification.table import HOLDS, Row, Table
 
@@ -111,7 +110,6 @@ def numbers(tables: Mapping[str, Table]) -> Values:
     runs = tables[CERTIFIED_RUNS]
     told = ours(impacts)
     printed = impacts.where(method=PRINTED).records()[0]
-    bare = impacts.where(method=NO_CLAMP).records()[0]
     widest = max(scenes.records(), key=lambda row: float(row[OPEN]))
     caught = laws[CAUGHT]
     return {
@@ -120,10 +118,7 @@ def numbers(tables: Mapping[str, Table]) -> Values:
         "runs": len(runs.rows),
         "impacts_in_runs": _sum(runs, "impacts"),
         "gains_in_runs": _sum(runs, "gains"),
-        "printed_impacts": printed["impacts"],
-        "printed_gains": printed["gains"],
         "printed_largest_gain": printed[GAIN],
-        "no_clamp_largest_gain": bare[GAIN],
         "impact_laws": len(LAWS),
         "laws": len(laws.rows),
         "laws_kept": sum(laws.decided),
@@ -133,7 +128,6 @@ def numbers(tables: Mapping[str, Table]) -> Values:
         "scenes_above_1_percent": sum(row[OPEN] > WORTH_NAMING for row in scenes.records()),
         "widest_residual_percent": widest[OPEN],
         "widest_scene": widest["scene"].replace("_", " "),
-        "largest_scene_gain_percent": max(scenes[SCENE_GAIN]),
         **_example(tables[COUNTEREXAMPLES.key]),
     }
 

@@ -36,7 +36,7 @@ WORDS = {
     "svd": "SVD",
     "PB": "spring only",
     "ideal": "rigid wall",
-    "ideal with friction": "rigid, friction",
+    "ideal-friction": "rigid, friction",
     "Newton with Coulomb": "Newton, Coulomb",
 }
 # world -> share of the time at which its name stands, and the way to it [points]

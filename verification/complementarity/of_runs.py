@@ -243,14 +243,14 @@ def _rows_of_step(
     """Return the rows nᵀ(J_a − J_b) (k, d) of the group's contacts, or the rows along other
     directions (k, 3)."""
     table = run.contacts
-    q = blow.q
-    rows = np.zeros((len(blow.contacts), mechanism.nv))
-    for i, m in enumerate(blow.contacts):
-        along = table.normal[m] if directions is None else directions[i]
-        rows[i] = along @ mechanism.point_jacobian(q, int(table.body_a[m]), table.point[m])
-        if table.body_b[m] >= 0:
-            rows[i] -= along @ mechanism.point_jacobian(q, int(table.body_b[m]), table.point[m])
-    return rows
+    contacts = blow.contacts
+    along = table.normal[contacts] if directions is None else directions
+    places = np.tile(blow.q, (len(contacts), 1))
+    of_a, of_b = (
+        mechanism.rows_along(places, bodies[contacts], table.point[contacts], along)
+        for bodies in (table.body_a, table.body_b)
+    )
+    return of_a - of_b
 
 
 def scene_impacts(name: str, restitution: float | None = None) -> tuple[ImpactCase, ...]:

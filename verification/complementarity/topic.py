@@ -26,7 +26,6 @@ def _numbers(tables: Mapping[str, Table]) -> Values:
     scenes = found.where(kind=SCENE)
     piles = tables[PILES.key]
     solvers = tables[SOLVER_TABLE.key]
-    pinocchio = tables[AGAINST_PINOCCHIO.key]
     return {
         "impacts": sum(found["cases"]),
         "agree": sum(found["agree"]),
@@ -38,10 +37,7 @@ def _numbers(tables: Mapping[str, Table]) -> Values:
         "scene_impacts_that_pull": sum(scenes["differ"]),
         "pile_limit": max(piles["most contacts that agree"]),
         "pushing_from_the_lcp": max(piles["pushing only, from the LCP"]),
-        "largest_extra_loss": max(found["largest extra loss of KE⁻"]),
         "solvers": len(solvers.rows),
-        "pinocchio_states": sum(pinocchio["states"]),
-        "from_pinocchio": max(pinocchio["worst"], default=None),
     }
 
 

@@ -24,8 +24,6 @@ Exact = NDArray[np.object_] | Floats
 NEWTON_COULOMB = (
     "Newton with Coulomb"  # Newton's law with Coulomb friction, as in Kane and Levinson
 )
-# the rigid world with Coulomb friction; the paper's rigid worlds have none
-COULOMB = "ideal with friction"
 RESTITUTION_TOLERANCE = 1e-8  # the tolerance of the kit for all resolvers
 NO_GAIN = 1e-12  # rounding of the sums of energies over the run's steps
 STABLE = "stable"
@@ -173,7 +171,7 @@ class TrajectoryCase:
     law : the exact law of the motion, in words.
     scene : the scene to simulate.
     measure : function that measures a run of the scene.
-    worlds : names of worlds for `verification.hard_cases.judge.run_in_world`.
+    worlds : names of worlds.
     """
 
     name: str

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from iapb.run import Run
 from iapb.scene import Scene
 from verification.hard_cases.case import (
-    COULOMB,
     NO_GAIN,
     Measured,
     TrajectoryCase,
@@ -31,7 +30,7 @@ from verification.hard_cases.case import (
 
 _G = 9.81
 _IMPLICIT = {"forces": "implicit"}
-_WORLDS = ("IAPB", "PB", COULOMB)
+_WORLDS = ("IAPB", "PB", "ideal-friction")
 
 # --- Kane and Levinson's double pendulum
 # -----------------------------------------------------------------------
@@ -80,7 +79,7 @@ def double_pendulum_motion() -> TrajectoryCase:
             level=_FLOOR,
         ),
         _measure_pendulum,
-        worlds=("IAPB", "PB", "ideal", COULOMB),
+        worlds=("IAPB", "PB", "ideal", "ideal-friction"),
     )
 
 

@@ -26,12 +26,9 @@ from iapb.errors import IapbError, RangeError
 from iapb.run import Run
 from iapb.scene import Scene, scene_from_text
 from iapb.scene.mechanism import mechanism_of
-from iapb.simulation import simulate
 from reference.exact import fractions_of, rational_matrix, relative_energy_gain
-from reference.time_stepping import RigidConstraints
-from reference.worlds import require_complete, run_world
+from reference.worlds import run_world
 from verification.hard_cases.case import (
-    COULOMB,
     DEPENDS_ON_ROUNDING,
     NEWTON_COULOMB,
     NOT_TRIED,
@@ -73,13 +70,6 @@ _ALL_NOISE = 0.5
 MOST_CONTACTS = 2000  # on which these methods are tried: the SVD of W takes a second
 
 
-def run_in_world(scene: Scene, world: str) -> Run:
-    """Simulate a scene in one of the paper's worlds, or in the rigid one with Coulomb friction."""
-    if world != COULOMB:
-        return run_world(scene, world)
-    return require_complete(simulate(scene, RigidConstraints(friction="coulomb"), world=world))
-
-
 def methods_for(case: AnyCase) -> tuple[str, ...]:
     """Return the impact methods or the worlds that are judged on a case."""
     if isinstance(case, HardCase):
@@ -102,7 +92,7 @@ _NUMBERS = (
 )
 
 
-def judge_hard_case(case: AnyCase, method: str, simulate: Simulate = run_in_world) -> Row:
+def judge_hard_case(case: AnyCase, method: str, simulate: Simulate = run_world) -> Row:
     """Return the row of one method on one impact, or of one world on one trajectory.
 
     The outcome is "stable", "gains energy", "restitution unmet", "wrong motion", "refused",
@@ -121,7 +111,7 @@ def judge_hard_case(case: AnyCase, method: str, simulate: Simulate = run_in_worl
 def _judge_motion(case: TrajectoryCase, world: str, simulate: Simulate) -> Row:
     """Return the row of one world on one motion."""
     try:
-        run = (run_in_world if world == COULOMB else simulate)(case.scene, world)
+        run = simulate(case.scene, world)
     except IapbError as error:
         return _row(world, _verdict_of(error), note=str(error))
     found = case.measure(run)

@@ -11,9 +11,9 @@ import numpy as np
 from reference.one_thread import one_thread
 from verification.check import Check, Study, Topic
 from verification.finding import Part
-from verification.hard_cases.case import COULOMB, NOT_TRIED, STABLE, AnyCase, TrajectoryCase
+from verification.hard_cases.case import NOT_TRIED, STABLE, AnyCase, TrajectoryCase
 from verification.hard_cases.catalogue import HARD_CASES
-from verification.hard_cases.judge import judge_hard_case, methods_for, run_in_world
+from verification.hard_cases.judge import judge_hard_case, methods_for
 from verification.numbers import Values
 from verification.ordinary.judge import ORDINARY, OURS, THEIRS
 from verification.ordinary.touch import TOUCH
@@ -110,8 +110,7 @@ def _failing_motions(study: Study) -> list[TrajectoryCase]:
 def _over_time(study: Study, case: TrajectoryCase) -> Iterator[Row]:
     """Yield the kinetic energy of the moving bodies over time in each world of the case."""
     for world in case.worlds:
-        simulate = run_in_world if world == COULOMB else study.run
-        run = simulate(case.scene, world)
+        run = study.run(case.scene, world)
         kinetic = run.energy["kinetic"]
         for place in _instants(kinetic):
             yield {

@@ -102,11 +102,9 @@ def on_proofs(
         "statements": len(records),
         "proved": proved,
         "by_sympy": sum(one.sympy == YES for one in records),
-        "false_variants": sum(len(one.twins) for one in records),
         "theorems": len(accepted),
         "coq": development.version or None,
         "theorems_by_coq": sum(accepted) if development.version else None,
-        "statements_by_coq": len(in_coq) if development.version else None,
     }
     parts = [Part.on("statements that are not proved", len(records) - proved, 0)]
     if development.version:

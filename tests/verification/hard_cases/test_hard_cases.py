@@ -56,10 +56,8 @@ def _with_a_fault(case: AnyCase, method: str, size: float) -> str:
     """The verdict on the answer with a fault of that relative size, of all faults the kindest
     one."""
     if isinstance(case, TrajectoryCase):
-        run = judge.faulty_motion(judge.run_in_world(case.scene, method), size)
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("verification.hard_cases.judge.run_in_world", lambda *_: run)
-            return judged(case, method, lambda *_: run)["outcome"]
+        run = judge.faulty_motion(judge.run_world(case.scene, method), size)
+        return judged(case, method, lambda *_: run)["outcome"]
     answer = judge.resolve_once(case, method)
     verdicts = []
     for wrong in judge.faulty_answers(case, answer.velocity):
