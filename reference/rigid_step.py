@@ -5,11 +5,11 @@ One step of length dt from velocity v, with generalized force f and contact rows
     v_free = v + dt M⁻¹ f,   v⁺ = argmin ½|v⁺ − v_free|²_M  subject to  J v⁺ >= b,   p the
     multipliers,
 
-    b_i = −gap_i/dt         open contact (gap > CLOSED) that may close but not penetrate
-    (Stewart-Trinkle, Anitescu) b_i = −inf              open contact without constraint (Moreau): it
-    acts only after it closes b_i = −e gamma_minus_i  closed contact that approaches (Newton); 0 in
-    Poisson's step b_i = 0                 closed contact that does not approach; with
-    `stabilization`, a share of −gap_i/dt if gap < 0
+    b_i = −gap_i/dt          open contact (gap > CLOSED) with e_i = 0: it may close but not pass
+                             (Stewart-Trinkle, Anitescu)
+    b_i = −inf               open contact with e_i > 0: it acts only after it closes (Moreau)
+    b_i = −e gamma_minus_i   closed contact that approaches (Newton); 0 in Poisson's step
+    b_i = 0                  closed contact that does not approach; a share of −gap_i/dt if gap < 0
 
 Poisson's step adds the impulses e p at the contacts that approached, and solves once more with the
 same b. It has a solution also if Newton's law has none (opposed closed contacts with e > 0). Each
@@ -26,11 +26,10 @@ Dynamics 14 (1997).
 
 With dry friction (`friction_step`) the step's contacts are blocks (normal, one tangent in the plane
 or two in space): K ∋ p ⟂ w + mu |w_T| n ∈ K*, where w is J v⁺ − b on the normals and the tangential
-velocity after the step; `relaxed` drops mu |w_T| (Anitescu). The problem is first solved for the
-closing contacts alone. Contacts that close under this solution are then added, and it is solved
-again; the last solution solves the whole problem. Contacts without a common body (zero blocks of W)
-form separate problems, the islands. Source: Stewart and Trinkle (1996); Anitescu and Tasora,
-Comput. Optim. Appl. 47 (2010).
+velocity after the step. The problem is first solved for the closing contacts alone. Contacts that
+close under this solution are then added, and it is solved again; the last solution solves the whole
+problem. Contacts without a common body (zero blocks of W) form separate problems, the islands.
+Source: Stewart and Trinkle (1996); Anitescu and Tasora, Comput. Optim. Appl. 47 (2010).
 """
 
 from __future__ import annotations
@@ -40,8 +39,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from iapb.errors import ArgumentError, SolverError
-from iapb.names import one_of
+from iapb.errors import SolverError
 from reference import Floats
 from reference.complementarity.problem import ImpactProblem
 from reference.complementarity.solution import SOLVED_TOLERANCE, Solution
@@ -61,13 +59,7 @@ CLOSED = 1e-12
 
 # Active sets cycle for some redundant rows, projections do not.
 STEP_SOLVERS = {"daqp": daqp, "quadprog": quadprog, "gauss_seidel": projected_sweeps}
-SCHEMES = ("automatic", "moreau", "stewart-trinkle")
-_AUTOMATIC = 0
-_STEWART = 2
-NEWTON = "Newton"
-POISSON = "Poisson"
 
-FRICTION_LAWS = ("none", "coulomb", "relaxed")
 # Gauss-Seidel reaches 1e-13 of the velocities if it converges; such a solution is accepted at once.
 # On hyperstatic contacts it converges slowly, and an interior point stops at the square root of its
 # accuracy. Then the best solution is accepted if it reaches the tolerance of
@@ -85,7 +77,6 @@ class RigidStep(NamedTuple):
         Floats  #: (c,) p >= 0 [N s], zero for contacts left out; not unique for redundant contacts
     )
     residual: float  #: recomputed natural-map residual of the step's LCP, relative to the velocities involved
-    restitution_law: str = NEWTON  #: "Newton" or "Poisson", the law that the step used
 
 
 class StepContacts(NamedTuple):
@@ -94,9 +85,7 @@ class StepContacts(NamedTuple):
     jacobian: Floats  #: (c, d) unit-normal rows
     gap: Floats  #: (c,) [m]
     restitution: float | Floats  #: e in [0, 1], one for all contacts or (c,)
-    #: share in [0, 1] of an overlap that this step removes (0: none, as in Moreau's step), one for
-    #: all contacts or (c,)
-    stabilization: float | Floats = 0.0
+    removed: float | Floats = 0.0  #: share in [0, 1] of an overlap that this step removes, or (c,)
 
 
 def rigid_step(
@@ -105,18 +94,17 @@ def rigid_step(
     force: Floats,
     dt: float,
     contacts: StepContacts,
-    scheme: str = "automatic",
+    together: bool = False,
 ) -> RigidStep:
     """Advance v (d,) by dt [s] under generalized force f (d,) and unilateral contacts.
 
     Parameters
     ----------
-    scheme : "moreau" ignores open contacts; "stewart-trinkle" keeps them from penetrating, with
-        Poisson's law if e > 0; "automatic" treats an open contact as Stewart-Trinkle's step if its
-        e = 0 and as Moreau's if e > 0
+    together : whether open contacts with e > 0 act, too: Stewart-Trinkle's step for all, with
+        Poisson's law if an e > 0
 
     If Newton's law has no solution (opposed closed contacts with e > 0) or would gain energy, the
-    step uses Poisson's law, and `restitution_law` says so.
+    step uses Poisson's law.
 
     Raises
     ------
@@ -124,12 +112,12 @@ def rigid_step(
         No solver reaches a residual of STEP_TOLERANCE; the message gives the number of contacts and
         each solver's text.
     """
-    contact_jacobian, gap, restitution, stabilization = contacts
+    contact_jacobian, gap, restitution, removed = contacts
     gamma_minus = contact_jacobian @ velocity
     bounces = bool(np.any(restitution))
-    bound = velocity_bounds(gap, gamma_minus, restitution, dt, stabilization, scheme)
+    bound = velocity_bounds(gap, gamma_minus, restitution, dt, removed, together)
     v_free = velocity + dt * solve_mass(mass_matrix, force)
-    poisson = scheme == "stewart-trinkle" and bounces
+    poisson = together and bounces
     if not poisson:
         try:
             newton = nearest_velocity(mass_matrix, v_free, contact_jacobian, bound)
@@ -139,16 +127,14 @@ def rigid_step(
         except SolverError:
             if not bounces or np.count_nonzero(gap <= 0.0) < 2:
                 raise
-    compression = velocity_bounds(
-        gap, gamma_minus, 0.0, dt, stabilization if poisson else 0.0, scheme
-    )
+    compression = velocity_bounds(gap, gamma_minus, 0.0, dt, removed if poisson else 0.0)
     compression = np.where(np.isfinite(bound), compression, -np.inf)
     compressed = nearest_velocity(mass_matrix, v_free, contact_jacobian, compression)
     returned = np.where(gamma_minus < 0.0, restitution, 0.0) * compressed.impulse
     bounced = compressed.velocity + solve_mass(mass_matrix, contact_jacobian.T @ returned)
     kept = nearest_velocity(mass_matrix, bounced, contact_jacobian, compression)
     impulse = compressed.impulse + returned + kept.impulse
-    return RigidStep(kept.velocity, impulse, max(compressed.residual, kept.residual), POISSON)
+    return RigidStep(kept.velocity, impulse, max(compressed.residual, kept.residual))
 
 
 def _gains(step: RigidStep, contact_jacobian: Floats, gamma_minus: Floats, v_free: Floats) -> bool:
@@ -293,42 +279,15 @@ def velocity_bounds(
     gamma_minus: Floats,
     restitution: float | Floats,
     dt: float,
-    stabilization: float | Floats = 0.0,
-    scheme: str = "automatic",
+    removed: float | Floats = 0.0,
+    together: bool = False,
 ) -> Floats:
     """Return b (c,) of J v⁺ >= b [m/s], for one e or e (c,); −inf marks contacts that the step
     ignores."""
-    e = np.asarray(restitution, np.float64)
-    share = np.asarray(stabilization, np.float64)
-    if not _are_shares(e) or e.shape not in ((), gap.shape):
-        raise ArgumentError(
-            "restitution", restitution, "values in [0, 1], one for all or one for each contact"
-        )
-    if not _are_shares(share):
-        raise ArgumentError("stabilization", stabilization, "values in [0, 1]")
-    if scheme not in SCHEMES:
-        raise ArgumentError("scheme", scheme, one_of(scheme, SCHEMES))
-    given = gap, gamma_minus, e.ravel(), share.ravel(), dt, SCHEMES.index(scheme)
-    return np.asarray(_bounds(*given))
-
-
-def _are_shares(values: Floats) -> bool:
-    return bool(((values >= 0.0) & (values <= 1.0)).all())
-
-
-@numba.njit(cache=True, fastmath=False)
-def _bounds(gap, gamma, restitution, share, dt, scheme):  # type: ignore[no-untyped-def]
-    """Do `velocity_bounds` for the number of a scheme; one e or share is that of all contacts."""
-    found = np.empty(len(gap))
-    for c in range(len(gap)):
-        e = restitution[min(c, len(restitution) - 1)]
-        if gap[c] > CLOSED:
-            closes = scheme == _STEWART or (scheme == _AUTOMATIC and e == 0.0)
-            found[c] = -gap[c] / dt if closes else -np.inf
-        else:
-            bounced = 0.0 if scheme == _STEWART else e * max(-gamma[c], 0.0)
-            found[c] = max(bounced, share[min(c, len(share) - 1)] * max(-gap[c], 0.0) / dt)
-    return found
+    closing = np.where(together or np.equal(restitution, 0.0), -gap / dt, -np.inf)
+    bounced = 0.0 if together else restitution * np.maximum(-gamma_minus, 0.0)
+    back = removed * np.maximum(-gap, 0.0) / dt
+    return np.where(gap > CLOSED, closing, np.maximum(bounced, back))
 
 
 def friction_step(
@@ -338,7 +297,6 @@ def friction_step(
     tangent_rows: Floats,
     bound: Floats,
     friction: float | Floats,
-    relaxed: bool = False,
 ) -> tuple[Floats, Floats, Floats]:
     """Return v⁺ (d,), normal (c,) and tangential impulses (c, s) [N s] of one step.
 
@@ -367,12 +325,12 @@ def friction_step(
         offset = rows @ v_free
         offset[::size] -= bound[taken]
         response = np.linalg.solve(mass_matrix, rows.T)
-        impulse[taken] = _by_islands(rows @ response, offset.reshape(-1, size), mu[taken], relaxed)
+        impulse[taken] = _by_islands(rows @ response, offset.reshape(-1, size), mu[taken])
         velocity = v_free + response @ impulse[taken].ravel()
     return velocity, impulse[:, 0], impulse[:, 1:]
 
 
-def _by_islands(w: Floats, offset: Floats, friction: Floats, relaxed: bool) -> Floats:
+def _by_islands(w: Floats, offset: Floats, friction: Floats) -> Floats:
     """Return p (k, size) for offset (k, size) [m/s]: of each island, the first that converges, or
     the best."""
     from scipy.sparse.csgraph import connected_components
@@ -388,7 +346,6 @@ def _by_islands(w: Floats, offset: Floats, friction: Floats, relaxed: bool) -> F
             0.0,
             friction[mine],
             contact_size=size,
-            relaxed=relaxed,
         )
         found: list[Solution] = []
         while len(found) < len(FRICTION_SOLVERS) and not (found and found[-1].solved(CONVERGED)):

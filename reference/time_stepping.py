@@ -13,7 +13,7 @@ Contacts are found and recorded at the midpoint.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,8 +29,6 @@ from reference import Floats, contact_rows
 from reference.free_motion import free_motion
 from reference.one_thread import one_thread
 from reference.rigid_step import (
-    FRICTION_LAWS,
-    SCHEMES,
     StepContacts,
     friction_step,
     rigid_step,
@@ -44,6 +42,8 @@ MOST_ENTRIES = 50_000_000
 # from 50 on.
 SECONDS_A_STEP = 1e-3
 SECONDS_AN_ENTRY = 3e-7
+
+FRICTION_LAWS = ("none", "coulomb")
 
 
 class _Solved(NamedTuple):
@@ -62,32 +62,20 @@ class RigidConstraints:
 
     Parameters
     ----------
-    margin : the step considers contacts with gap <= margin [m]; infinity includes every candidate
-        pair, and a finite margin must exceed the largest speed times the step
-    stabilization : share of an overlap that each step removes, 0 for none
-    scheme : "moreau", "stewart-trinkle" or "automatic" (see `reference.rigid_step`)
-    friction : "none" (the paper's rigid worlds), "coulomb" or "relaxed", with the scene's
-        coefficient
+    friction : "none" (the paper's rigid worlds), or "coulomb" with the scene's coefficient
 
     Restitution follows Newton's law with the scene's value for each pair. Poisson's law is used in
-    "stewart-trinkle" with e > 0, and in frictionless steps for which Newton's law has no solution
-    or would gain energy. This can happen with one e for all contacts, too (see the example in
-    `reference.rigid_step`). With friction, Newton's law may gain energy.
+    frictionless steps where values differ, or for which Newton's law has no solution or would gain
+    energy. The latter can happen with one e for all contacts, too (see `reference.rigid_step`).
+    With friction, Newton's law may gain energy.
     """
 
-    margin: float = np.inf
-    stabilization: float = 0.0
-    scheme: str = "automatic"
     friction: str = "none"
     name = "rigid constraints"
 
     def __post_init__(self) -> None:
-        for argument, value, known in (
-            ("scheme", self.scheme, SCHEMES),
-            ("friction", self.friction, FRICTION_LAWS),
-        ):
-            if value not in known:
-                raise ArgumentError(argument, value, one_of(value, known))
+        if self.friction not in FRICTION_LAWS:
+            raise ArgumentError("friction", self.friction, one_of(self.friction, FRICTION_LAWS))
 
     @property
     def uses(self) -> frozenset[str]:
@@ -101,7 +89,7 @@ class RigidConstraints:
         """All parameters of a step besides the scene, which gives the coefficients of restitution
         and friction."""
         return {
-            **asdict(self),
+            "friction": self.friction,
             "restitution where Newton's law has no solution or gains energy": "Poisson",
         }
 
@@ -148,7 +136,7 @@ class RigidConstraints:
         if before:
             q, v = free_motion(mechanics, q, v, before)
         mass = mechanics.mass_matrix(q)
-        found = contact_rows.find_rows(system, q, v, self.margin)
+        found = contact_rows.find_rows(system, q, v, np.inf)
         # B belongs to the free motion after the forces; where it is zero, its rounding errors keep
         # their old place.
         inner = mechanics.gravity(q, g) if mechanics.has_bias else mechanics.inner_forces(q, v, g)
@@ -207,18 +195,17 @@ class RigidConstraints:
         classes, table = system.frictions
         values = system.restitutions
         shapes = found.geometry[:2]
-        scheme = self.scheme
         e: float | Floats = (
             float(values[0]) if len(values) else float(system.scene.contact.restitution)
         )
-        if len(values) > 1:  # pairs that can touch differ: one e for each contact
+        differs = len(values) > 1  # among pairs that can touch: one e for each contact
+        if differs:
             e = restitution_by_pair(system.scene, np.stack(shapes, axis=1))
-            # Contacts that touch together must act together, wherever in a step they do.
-            scheme = "stewart-trinkle" if scheme == "automatic" else scheme
-        removed = np.maximum(self.stabilization, removed * np.equal(e, 0.0))
+        removed = removed * np.equal(e, 0.0)
         if self.friction == "none" or not table.any():
+            # Contacts that touch together must act together, wherever in a step they do.
             contacts = StepContacts(found.jacobian, found.gap, e, removed)
-            step = rigid_step(mass, v, force, dt, contacts, scheme)
+            step = rigid_step(mass, v, force, dt, contacts, together=differs)
             return _Solved(
                 step.velocity,
                 step.impulse,
@@ -226,13 +213,10 @@ class RigidConstraints:
                 np.zeros_like(found.jacobian.T),
             )
         mu = table[classes[shapes[0]], classes[shapes[1]]]
-        bound = velocity_bounds(found.gap, found.gamma, e, dt, removed, self.scheme)
+        bound = velocity_bounds(found.gap, found.gamma, e, dt, removed)
         tangents, rows = contact_rows.tangent_rows(system, q, found)
         v_free = v + dt * np.linalg.solve(mass, force)
-        relaxed = self.friction == "relaxed"
-        velocity, normal, slip = friction_step(
-            mass, v_free, found.jacobian, rows, bound, mu, relaxed
-        )
+        velocity, normal, slip = friction_step(mass, v_free, found.jacobian, rows, bound, mu)
         along = np.einsum("csx,cs->cx", tangents, slip)
         dragging = np.einsum("csd,cs->dc", rows, slip)
         return _Solved(velocity, normal, along, dragging)
