@@ -26,7 +26,7 @@ Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instea
 WIDTH = 80  # of the lines
 SILENCE = 30.0  # [s] between two lines of a log
 _WIDEST = 26  # of a column; longer texts go on in the next line
-_GAP = "  "  # between columns
+_GAP = 2  # characters between columns
 _LONGEST_ERROR = 400  # characters
 
 
@@ -75,18 +75,53 @@ def sentence(text: str, mark: str = "") -> str:
 def table_text(table: Table) -> str:
     """Return a table as text. A table that is too wide continues below, with its first column
     repeated."""
+    from rich.console import Console
+
     columns = [
-        _wrapped(title, [_text(row[k], table.digits) for row in table.cells])
+        _Column(title, [_text(row[k], table.digits) for row in table.cells])
         for k, title in enumerate(table.titles)
     ]
     blocks = [columns[:1]]
     for column in columns[1:]:
-        if all(cell == ["-"] for cell in column[1:]):
+        if {*column.cells} <= {"-"}:
             continue
-        if len(blocks[-1]) > 1 and sum(map(_width, [*blocks[-1], column])) > WIDTH + len(_GAP):
+        wide = sum(one.width + _GAP for one in [*blocks[-1], column])
+        if len(blocks[-1]) > 1 and wide > WIDTH + _GAP:
             blocks.append(columns[:1])
         blocks[-1].append(column)
-    return "\n\n".join(map(_printed, blocks))
+    console = Console(width=1000, color_system=None, markup=False, emoji=False, highlight=False)
+    with console.capture() as printed:
+        for block in blocks:
+            console.print(_printed(block))
+            console.print()
+    lines = [line.rstrip() for line in printed.get().splitlines()]
+    return "\n".join(lines).rstrip().replace("\N{NO-BREAK SPACE}", " ")
+
+
+class _Column:
+    """One column: its title, whose unit stays on one line, its cells, and its width."""
+
+    def __init__(self, title: str, cells: list[str]) -> None:
+        self.title = re.sub(
+            r"\[[^]]*\]$", lambda unit: unit[0].replace(" ", "\N{NO-BREAK SPACE}"), title
+        )
+        self.cells = cells
+        lines = (line for cell in cells for line in textwrap.wrap(cell, _WIDEST))
+        self.width = max(map(len, [*lines, *self.title.split(" ")]))
+
+
+def _printed(columns: list[_Column]) -> Any:
+    from rich.box import Box
+    from rich.table import Table
+
+    rule = Box("    \n    \n -- \n    \n    \n    \n    \n    \n", ascii=True)
+    printed = Table(box=rule, show_edge=False, pad_edge=False, padding=(0, _GAP - 1, 0, 0))
+    for number, column in enumerate(columns):
+        side: Any = "right" if number else "left"
+        printed.add_column(column.title, width=column.width, justify=side, overflow="fold")
+    for row in zip(*(column.cells for column in columns), strict=True):
+        printed.add_row(*row)
+    return printed
 
 
 def _text(value: Any, digits: int) -> str:
@@ -95,42 +130,6 @@ def _text(value: Any, digits: int) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     return f"{value:.{digits}g}" if isinstance(value, float) else str(value)
-
-
-def _wrapped(title: str, texts: list[str]) -> list[list[str]]:
-    """Return heading and cells as lines; the heading is as wide as the widest cell or its longest
-    word with unit."""
-    whole = re.sub(r"\[[^]]*\]$", lambda unit: unit[0].replace(" ", "\N{NO-BREAK SPACE}"), title)
-    cells = [textwrap.wrap(text, _WIDEST) or [""] for text in texts]
-    widest = max(map(len, [*(line for cell in cells for line in cell), *whole.split()]), default=1)
-    return [textwrap.wrap(whole, max(widest, 1)), *cells]
-
-
-def _width(column: list[list[str]]) -> int:
-    return max(len(line) for cell in column for line in cell) + len(_GAP)
-
-
-def _printed(columns: list[list[list[str]]]) -> str:
-    widths = [_width(column) - len(_GAP) for column in columns]
-    lines = list[str]()
-    for number, row in enumerate(zip(*columns, strict=True)):
-        height = max(map(len, row))
-        full = [
-            [""] * (height - len(cell)) + cell
-            if number == 0
-            else cell + [""] * (height - len(cell))
-            for cell in row
-        ]  # headings stand on the rule
-        for first, *others in zip(*full, strict=True):
-            placed = [text.rjust(width) for text, width in zip(others, widths[1:], strict=True)]
-            lines.append(
-                _GAP.join([first.ljust(widths[0]), *placed])
-                .replace("\N{NO-BREAK SPACE}", " ")
-                .rstrip()
-            )
-        if number == 0:
-            lines.append("-" * min(WIDTH, sum(widths) + len(_GAP) * (len(widths) - 1)))
-    return "\n".join(lines)
 
 
 def duration(seconds: float) -> str:

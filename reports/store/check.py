@@ -13,10 +13,10 @@ from reports.store.folder import PARTIAL_SUFFIX
 from reports.store.io import (
     WRITING,
     ChangedFileError,
-    EarlierFileError,
     OpenFileError,
     data_checksum,
     data_seal,
+    head_of,
     looks_ours,
     opened,
     sealed,
@@ -36,7 +36,6 @@ LEFTOVER = "leftover"
 OTHER = "other version"
 CHANGED = "changed"
 OPEN = "open"
-_HEAD = 512  # bytes of a file, which hold its seal
 
 _RISK = (
     "it differs from its seal; reading such a file can crash the HDF5 library, so another process "
@@ -109,8 +108,6 @@ def _state(path: Path) -> FileState:
                     return FileState(
                         path, PARTIAL, f"{run.steps_done} steps are readable; {run.stopped}"
                     )
-    except EarlierFileError as error:
-        return FileState(path, OTHER, _said(error, path))
     except OpenFileError as error:
         return FileState(path, OPEN, _said(error, path))
     except ChangedFileError:
@@ -136,8 +133,7 @@ def _changed(path: Path) -> FileState:
 def _compared(path: Path) -> FileState:
     """Return the state of a changed file: whether its data agree with their own checksum."""
     try:
-        with path.open("rb") as begin:
-            stated = data_seal(begin.read(_HEAD))
+        stated = data_seal(head_of(path))
         with opened(path, None, changed=True) as file:
             same = data_checksum(file, Budget(path, file)) == stated
             found = str(attribute_of(file, "format", ""))

@@ -35,8 +35,6 @@ WRITING = ".writing"  # suffix of a file that is not yet complete
 
 _MARK = b"iapb sha256 "  # then the checksums of all bytes and of the data, 64 digits each
 _USER_BLOCK = 512  # bytes before the HDF5 content; HDF5 allows no fewer
-_MARK_AT_END = b"\niapb sha256 "  # of files up to format version 5, whose seal was at their end
-_SEAL_AT_END = len(_MARK_AT_END) + 64 + 1
 _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _FORMATS = (FORMAT, TABLE_FORMAT)
 _HEAD = 1 << 16  # bytes, among which the attributes of a file are
@@ -47,10 +45,6 @@ _CHUNK_BYTES = 1 << 17
 
 class ChangedFileError(RunFileError):
     """A file of iapb differs from its seal."""
-
-
-class EarlierFileError(RunFileError):
-    """An earlier version of iapb wrote the file."""
 
 
 class OpenFileError(RunFileError):
@@ -134,24 +128,18 @@ def write_whole(path: Path, content: str | bytes) -> None:
 def looks_ours(path: Path) -> bool:
     """Return whether a file is ours or was so before it was damaged: it has a seal, or its HDF5
     head has our attributes."""
-    head, end = _ends(path)
-    return (
-        head.startswith(_MARK)
-        or end.startswith(_MARK_AT_END)
-        or (
-            head.startswith((_HDF5_SIGNATURE, bytes(_USER_BLOCK) + _HDF5_SIGNATURE))
-            and b"\0format_version\0" in head
-            and any(name.encode() in head for name in _FORMATS)
-        )
+    head = head_of(path)
+    return head.startswith(_MARK) or (
+        head.startswith((_HDF5_SIGNATURE, bytes(_USER_BLOCK) + _HDF5_SIGNATURE))
+        and b"\0format_version\0" in head
+        and any(name.encode() in head for name in _FORMATS)
     )
 
 
-def _ends(path: Path) -> tuple[bytes, bytes]:
-    """Return the head of a file, and as many last bytes as a seal at the end had."""
+def head_of(path: Path) -> bytes:
+    """Return the bytes of a file that hold its seal, and the attributes of an HDF5 file."""
     with path.open("rb") as file:
-        head = file.read(_HEAD)
-        file.seek(max(path.stat().st_size - _SEAL_AT_END, 0))
-        return head, file.read()
+        return file.read(_HEAD)
 
 
 def sealed(content: bytes, data: str = "") -> bytes:
@@ -202,12 +190,7 @@ def data_checksum(file: Any, budget: Budget | None = None) -> str:
 def _check_seal(path: Path) -> None:
     """Raise RunFileError unless `path` is an HDF5 file whose every byte agrees with its seal."""
     _require_closed(path)
-    head, end = _ends(path)
-    if head.startswith(_HDF5_SIGNATURE) and end.startswith(_MARK_AT_END):
-        raise EarlierFileError(
-            f"{path}: format version is 5 or less, of an earlier iapb: this one reads "
-            f"{FORMAT_VERSION}; simulate the run again, it will be stored beside this file"
-        )
+    head = head_of(path)
     if not head.startswith(_MARK):
         raise RunFileError(
             f"{path}: no seal at its beginning: not written by iapb, or damaged there; if it was a "
@@ -306,14 +289,7 @@ def opened(
 
     path = Path(path)
     if not path.is_file():
-        what = (
-            "a folder, not a file"
-            if path.is_dir()
-            else "no regular file"
-            if path.exists()
-            else "no such file"
-        )
-        raise RunFileError(f"{path}: {what}")
+        raise RunFileError(f"{path}: {'not a file' if path.exists() else 'no such file'}")
     if path.suffix in (".yaml", ".yml"):
         raise RunFileError(f"{path}: a scene, not a run; `iapb run {path}` makes a run of it")
     try:
@@ -323,20 +299,11 @@ def opened(
             found = attribute_of(file, "format")
             if expected_format not in (None, found):
                 raise RunFileError(f"{path}: format is {found!r}: expected {expected_format!r}")
-            version = (
-                int(attribute_of(file, "format_version", 0)) if expected_format else FORMAT_VERSION
-            )
-            if version != FORMAT_VERSION:
-                earlier = version < FORMAT_VERSION
-                more = (
-                    "; simulate the run again, it will be stored beside this file"
-                    if earlier
-                    else ""
-                )
+            version = int(attribute_of(file, "format_version", 0))
+            if expected_format and version != FORMAT_VERSION:
                 raise RunFileError(
-                    f"{path}: format version is {version}, of "
-                    f"{'an earlier' if earlier else 'a later'} "
-                    f"iapb: this one reads {FORMAT_VERSION}{more}"
+                    f"{path}: format version is {version}, of another iapb: this one reads "
+                    f"{FORMAT_VERSION}; simulate the run again, it will be stored beside this file"
                 )
             yield file
     except IapbError:

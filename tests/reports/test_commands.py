@@ -121,7 +121,7 @@ REFUSED = [  # status, command line, what the refusal says
     (1, "run ''", "argument 2 = '': expected a value"),
     (1, "run peg_corner --out /dev/null/folder", "/dev/null/folder: "),
     (1, "inspect no_such_file.h5", "no_such_file.h5: no such file"),
-    (1, "inspect .", ".: a folder, not a file"),
+    (1, "inspect .", ".: not a file"),
     (1, "store check /", "not a whole file system"),
     (1, "certify cut.npz", "no archive"),
     (1, "certify half.npz", "mass_matrix, v_plus missing"),

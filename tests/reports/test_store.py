@@ -1,6 +1,5 @@
 """Check of the store, and runs that come out the same again."""
 
-import hashlib
 import shutil
 from dataclasses import replace
 
@@ -136,17 +135,6 @@ def test_a_file_that_another_program_holds_open_is_not_damaged(tmp_path):
             read_run(path)
     with h5py.File(path):  # a reader disturbs nobody
         assert [one.state for one in check_store(tmp_path)] == [CHANGED]
-
-
-def test_a_seal_at_the_end_is_of_an_earlier_version(tmp_path):
-    path = write_run(tmp_path / "run.h5", made_run(), provenance={})
-    content = path.read_bytes()[512:]
-    digest = hashlib.sha256(content).hexdigest()
-    path.write_bytes(content + f"\niapb sha256 {digest}\n".encode())
-    (found,) = check_store(tmp_path)
-    assert found.state == OTHER and "format version is 5 or less" in found.why
-    with pytest.raises(RunFileError, match="simulate the run again"):
-        read_run(path)
 
 
 @pytest.mark.parametrize("world", ["IAPB", "PB", "ideal", "CBuc", "IAPB-friction"])
