@@ -36,7 +36,7 @@ COMMANDS = {
     "verify-many": "Test the laws on a million impacts and thousands of trajectories; Ctrl-C lists what was found.",
     "verify-world": "Put a world to the laws of trajectories on random scenes.",
     "port": "Search the motion of a hand that draws energy from a force law; draw the map of devices.",
-    "compare": "Compare worlds on SCENE: distances, energy, time, and its impacts by every solver.",
+    "compare": "Compare worlds on SCENE: distances, energy, time, and IAPB's impacts with the LCP's.",
     "solvers": "Put problem files to every complementarity solver; or compare IAPB with complementarity.",
     "bench": "Time a step, an impact and a motion; compare with MuJoCo, Pinocchio, solvers and the printed formula.",
     "sweep": "Simulate every point of STUDY that has no run file yet, and write a table of all points.",

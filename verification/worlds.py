@@ -16,8 +16,7 @@ of its own pose.
 The reference world runs a second time at half its step; the difference is its own error. Worlds
 whose distances differ by less are not ordered.
 
-Every complementarity solver then solves the scene's impacts in IAPB; recomputed residuals judge the
-answers.
+The impacts of IAPB are then compared with the velocities of the frictionless LCP.
 """
 
 from __future__ import annotations
@@ -43,13 +42,10 @@ from iapb.scene.mechanism import mechanism_of
 from iapb.simulation import INTERRUPTED
 from reference import Floats
 from reference.complementarity.laws import newton_lcp
-from reference.complementarity.solvers import SOLVERS
-from reference.datasets import StoredProblem
 from reference.mujoco import MuJoCo
 from reference.worlds import WORLDS, run_world
 from verification.complementarity.agreement import PUSHED, SAME, distances
 from verification.complementarity.of_runs import StruckImpact, problems_of_run
-from verification.complementarity.solvers import VERDICTS, ProblemStudy, study_read
 from verification.finding import (
     MIXED,
     NOT_TESTABLE,
@@ -61,7 +57,7 @@ from verification.finding import (
     finding_of,
 )
 from verification.scenes.books import risen, work_given
-from verification.table import Row, Table, table_from
+from verification.table import Row, table_from
 
 Progress = Callable[[str, int, int], None]
 Ran = tuple[Run, float]  # a run, and the processor time per step [s] without set-up
@@ -70,12 +66,13 @@ Series = dict[
 ]  # arrays of quantities over time, by their column; None where a run does not record them
 
 INSTANTS = 1000  # largest number of instants at which worlds are compared
+IMPACTS = 200  # largest number of impacts of IAPB that are compared with the LCP's
 QUESTION = (
     "The scene is simulated in each world. Distances from the reference world are in the kinetic "
     "metric, for the whole "
     "mass: root mean square displacement and velocity of its particles, and the impulse of all "
     "contacts so far. "
-    "The impacts of IAPB are then given to every complementarity solver."
+    "The impacts of IAPB are then compared with the velocities of the frictionless LCP."
 )
 _UNITS = {"configuration": "m", "velocity": "m/s", "impulse": "N s"}  # of the three distances
 
@@ -104,7 +101,6 @@ def compare_worlds(
     worlds: Sequence[str] | None = None,
     against: str | None = None,
     *,
-    impacts: int = 12,
     progress: Progress | None = None,
 ) -> Finding:
     """Simulate a scene in several worlds and compare each with one of them.
@@ -119,17 +115,15 @@ def compare_worlds(
         that the scene has
     against : the reference world of the comparison; default: ideal, or ideal-friction if the scene
         has friction
-    impacts : largest number of impacts, spread over the motion, for all solvers; 0 for none
     progress : called as progress(stage, done, total)
 
     Returns
     -------
     Finding
-        Its tables are "worlds" (one row per world), "over time", and, if there are impacts,
-        "solvers" and "problems". The answer begins with IAPB's impacts beside the LCP's. Then it
-        names the closest of the worlds whose runs are complete and trustworthy, unless they differ
-        by less than the reference's own error (the difference from itself at half its step), and
-        the others with the reason.
+        Its tables are "worlds" (one row per world) and "over time". If IAPB is one of the worlds,
+        the answer begins with its impacts beside the LCP's. Then it names the closest of the worlds
+        whose runs are complete and trustworthy, unless they differ by less than the reference's own
+        error (the difference from itself at half its step), and the others with the reason.
 
     Raises
     ------
@@ -194,15 +188,11 @@ def compare_worlds(
     said += "".join(f"; {name} {why}" for name, why in unfit.items())
     parts = [Part(f"{said}.", MIXED if unfit else REPRODUCED, "runs", fit, len(runs))]
     headline: list[str] = []
-    if impacts:
-        struck = runs["IAPB"][0] if "IAPB" in runs else run_world(scene, "IAPB", partial=True)
-        judged = attempt(
-            "impacts", partial(compare_impacts, struck, scene, impacts, say, failures), failures
-        )
-        if judged:
-            parts += judged[0]
-            tables |= judged[1]
-            headline = [part.sentence for part in judged[0] if part.name == "motion"]
+    if "IAPB" in runs:
+        judging = partial(compare_impacts, runs["IAPB"][0], scene, failures)
+        if judged := attempt("impacts", judging, failures):
+            parts.append(judged)
+            headline += [judged.sentence] if judged.decided else []
     finding = finding_of(
         f"worlds of {scene.name}",
         scene.title or scene.name,
@@ -420,62 +410,16 @@ def _answer(
     )
 
 
-# The impacts of IAPB as complementarity problems, with and without friction, for every solver.
-LONGEST = 0.4  # [s] a solver that takes longer on one impact skips larger ones
-CASES = (
-    200  # largest number of impacts for which IAPB's motion is compared with that of the Newton LCP
-)
-
-
-def compare_impacts(
-    run: Run, scene: Scene, most: int, progress: Progress, failures: list[Failure]
-) -> tuple[list[Part], dict[str, Table]]:
-    """Return the parts on the impacts of an IAPB run, and the tables "solvers" and "problems"."""
-    struck = problems_of_run(run, scene)
-    if not struck:
-        why = (
-            "bodies strike several times in a step" if len(run.impacts.step) else "nothing collides"
-        )
-        said = f"No impact of {scene.name} can be given to solvers: {why}."
-        return [Part(said, NOT_TESTABLE, "impacts", optional=True)], {}
-    problems = [
-        problem
-        for one in _spread(struck, most)
-        for problem in (one.smooth, one.rough)
-        if problem is not None
-    ]
-    stored = [StoredProblem(problem) for problem in problems]
-    study = study_read(
-        f"impacts of {scene.name}", stored, longest=LONGEST, progress=progress, failures=failures
-    )
-    return [_moves(struck, failures), _solved(study)], {
-        "solvers": table_from(
-            [_solver(study, name) for name in study.solvers],
-            3,
-            "Residuals are recomputed from the problem, relative to its velocities; solved: at most 1e-6.",
-            timed=("median time", "left out"),
-        ),
-        "problems": table_from(_problems(study), 3, timed=("time", "note")),
-    }
-
-
-def _spread(struck: list[StruckImpact], most: int) -> list[StruckImpact]:
-    """Return at most `most` impacts: the one with the most contacts, and others spread over the
-    motion."""
-    widest = max(range(len(struck)), key=lambda k: struck[k].smooth.contacts)
-    spread = np.linspace(0, len(struck) - 1, most - 1).round().astype(int).tolist()
-    return [struck[k] for k in sorted({widest, *spread})]
-
-
-def _moves(struck: list[StruckImpact], failures: list[Failure]) -> Part:
+def compare_impacts(run: Run, scene: Scene, failures: list[Failure]) -> Part:
     """Return the part on IAPB's velocities and those of the LCP, which are equal if all contacts
     push."""
-    alike = [one for one in struck if not one.other_law][:CASES]
-    pairs = [attempt(one.smooth.name, partial(_apart, one), failures) for one in alike]
+    struck = problems_of_run(run, scene)
+    alike = [one for one in struck if not one.other_law][:IMPACTS]
+    pairs = [attempt(one.problem.name, partial(_apart, one), failures) for one in alike]
     compared = [pair for pair in pairs if pair is not None]
     left_out = Counter(one.other_law for one in struck if one.other_law)
     besides = "".join(f" Not compared: {many} with {why}." for why, many in left_out.items())
-    if unequal := sum(np.ptp(one.smooth.restitution) > 0.0 for one in alike):
+    if unequal := sum(np.ptp(one.problem.restitution) > 0.0 for one in alike):
         besides = f" In {unequal} contacts differ in e: there IAPB uses Poisson's law.{besides}"
     if not compared:
         said = f"No impact of IAPB is compared with the LCP.{besides}"
@@ -493,67 +437,4 @@ def _moves(struck: list[StruckImpact], failures: list[Failure]) -> Part:
 def _apart(one: StruckImpact) -> tuple[float, float]:
     """Return the distances of IAPB's answer from the LCP's velocity, and from impulses that
     push."""
-    return distances(one.smooth, one.velocity, newton_lcp(one.smooth).velocity)
-
-
-def _solved(study: ProblemStudy) -> Part:
-    """Return the part on correct answers and on solvers with wrong ones; a refusal or an error is
-    no answer."""
-    solved = sum(row.verdict == "solved" for row in study.rows)
-    wrong = Counter(
-        row.solver
-        for row in study.rows
-        if row.verdict == "failed" and np.isfinite(row.residuals.worst)
-    )
-    answers = solved + wrong.total()
-    unsolved = sum("solved" not in line.values() for line in study.lines)
-    sentence = (
-        f"{solved} of {answers} answers are solutions, by residuals recomputed from the problem; "
-        f"{len(study.lines) - unsolved} of {len(study.lines)} problems have one."
-    )
-    if wrong:
-        sentence += (
-            f" Wrong answers: {', '.join(f'{solver} {count}' for solver, count in wrong.items())}."
-        )
-    return Part(
-        sentence, MIXED if unsolved or wrong else REPRODUCED, "solvers", solved, answers, timed=True
-    )
-
-
-def _solver(study: ProblemStudy, name: str) -> Row:
-    mine = [row for row in study.rows if row.solver == name]
-    solved = [row for row in mine if row.verdict == "solved"]
-    return {
-        "solver": name,
-        "friction": "friction" if SOLVERS[name].takes == "cone" else "none",
-        "problems": len(mine),
-        **{verdict: sum(row.verdict == verdict for row in mine) for verdict in VERDICTS},
-        "worst residual": max((row.residuals.worst for row in solved), default=None),
-        "spread of velocities": max((row.spread for row in solved), default=None),
-        "median time [µs]": float(np.median([1e6 * row.seconds for row in solved]))
-        if solved
-        else None,
-    }
-
-
-def _problems(study: ProblemStudy) -> list[Row]:
-    """Return a row per solver and problem."""
-    size = {line["problem"]: line for line in study.lines}
-
-    def known(value: float) -> float | None:
-        return float(value) if np.isfinite(value) else None
-
-    return [
-        {
-            "problem": row.problem,
-            "unknowns": size[row.problem]["unknowns"],
-            "rank": size[row.problem]["rank"],
-            "solver": row.solver,
-            "outcome": row.verdict,
-            "worst residual": known(row.residuals.worst),
-            "spread of velocities": known(row.spread),
-            "time [µs]": known(1e6 * row.seconds),
-            "note": row.note,
-        }
-        for row in study.rows
-    ]
+    return distances(one.problem, one.velocity, newton_lcp(one.problem).velocity)

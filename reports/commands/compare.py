@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
@@ -41,9 +40,6 @@ def compare(
         ),
     ] = None,
     set_: Values = None,
-    impacts: Annotated[
-        int, typer.Option(min=0, help="Largest number of impacts of SCENE given to every solver.")
-    ] = 12,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -52,14 +48,13 @@ def compare(
     ] = None,
     json_: Json = False,
 ) -> Answer:
-    """Compare worlds on SCENE: distances, energy, time, and its impacts by every solver."""
+    """Compare worlds on SCENE: distances, energy, time, and IAPB's impacts with the LCP's."""
     place = as_json_file(out)
     with stage_progress() as progress:
         found = compare_worlds(
             scene_given(scene, set_),
             worlds.split(",") if worlds else None,
             against,
-            impacts=impacts,
             progress=progress,
         )
     place = place or FOLDER / f"{found.details['scene']}.json"
@@ -79,8 +74,7 @@ def compare(
 
 
 def _scene_lines(found: Finding) -> list[str | Table]:
-    """Return one page of text: distances, energy and time by world, then the results of the solvers
-    on the impacts."""
+    """Return one page of text: distances, energy and time by world."""
     table = found.tables["worlds"]
     against = found.details["against"]
     far = titled(
@@ -120,7 +114,7 @@ def _scene_lines(found: Finding) -> list[str | Table]:
         for row in table.records()
         if row["ignores"]
     )
-    lines: list[str | Table] = [
+    return [
         found.title,
         sentence(found.answer),
         *ignoring,
@@ -130,35 +124,5 @@ def _scene_lines(found: Finding) -> list[str | Table]:
         "",
         "Energy, penetration, time",
         table.select(rest),
+        "",
     ]
-    if "solvers" in found.tables:
-        every = found.tables["solvers"]
-        there = every.only(row["missing"] < row["problems"] for row in every.records())
-        lines += [
-            "",
-            "Its impacts as problems, by every solver",
-            there.without("left out", "missing", "spread of velocities"),
-            *(sentence(text, "  ") for text in _unsolved(found.tables["problems"])),
-        ]
-        if absent := [
-            name for name in every.column("solver") if name not in there.column("solver")
-        ]:
-            lines.append(sentence(f"Not installed: {', '.join(absent)}.", "  "))
-    return [*lines, ""]
-
-
-def _unsolved(problems: Table) -> Iterator[str]:
-    """Yield one line for each solver and failing outcome: how many problems it did not solve, one
-    of them, and why."""
-    failed = problems.only(
-        outcome not in ("solved", "missing") for outcome in problems.column("outcome")
-    )
-    for solver, outcome in dict.fromkeys(
-        zip(failed.column("solver"), failed.column("outcome"), strict=True)
-    ):
-        first, *others = failed.where(solver=solver, outcome=outcome).records()
-        residual = first["worst residual"]
-        why = ": ".join(
-            filter(None, [f"residual {residual:.1e}" if residual else "", first["note"]])
-        )
-        yield f"{solver} {outcome} {1 + len(others)}, such as {first['problem']}: {why.removeprefix('refused: ')}"

@@ -338,11 +338,8 @@ def test_bench_names_a_method_for_a_budget_and_prints_its_tables(answer, monkeyp
 
 def test_compare_puts_worlds_on_one_page_and_stores_them_with_their_figure(iapb, here):
     door = ("compare", SLOPE.with_name("door.yaml"), "--set", "duration=0.15", "--worlds", "IAPB")
-    status, out, err = iapb(*door, "--against", "IAPB", "--impacts", "1")
-    assert status == 0, err
-    rows = map(str.split, out.splitlines())
-    by_solver = {row[0]: row[2:6] for row in rows if {"none", "friction"} & set(row)}
-    assert by_solver["lemke"] == by_solver["nsgs"] == ["1", "1", "0", "0"]
+    status, out, err = iapb(*door, "--against", "IAPB")
+    assert status == 0 and "IAPB moves as the LCP in " in " ".join(out.split()), err
     place = Path("mine/slope.json")
     slope = ("compare", SLOPE, "--set", "duration=0.05", "--worlds", "IAPB,ideal,ideal-friction")
     status, out, err = iapb(*slope, "--out", place)

@@ -24,7 +24,6 @@ from iapb.scene.mechanism import (
 )
 from iapb.system import System, system_of
 from reference.complementarity.problem import ImpactProblem
-from reference.contact_rows import unit_tangents
 from reference.worlds import run_world
 from verification.impacts import Floats, ImpactCase
 
@@ -78,19 +77,17 @@ def impacts_of_run(run: Run, scene: Scene) -> tuple[tuple[ImpactCase, ...], int]
 
 
 class StruckImpact(NamedTuple):
-    """An impact of an IAPB run as problems for solvers, and IAPB's answer.
+    """An impact of an IAPB run as a problem without friction, and IAPB's answer.
 
     Attributes
     ----------
-    smooth : the normal rows with the restitution of each contact
-    rough : the same impact with friction; None if its contacts have none
+    problem : the normal rows with the restitution of each contact
     velocity : (d,) v⁺ of IAPB
     other_law : why IAPB's answer is not to be compared with the frictionless LCP's, and the setting
         that changes this; "" if it is
     """
 
-    smooth: ImpactProblem
-    rough: ImpactProblem | None
+    problem: ImpactProblem
     velocity: Floats
     other_law: str
 
@@ -101,8 +98,7 @@ RUBBING = "friction (contact.forces: paper leaves it out of impacts)"
 
 
 def problems_of_run(run: Run, scene: Scene) -> list[StruckImpact]:
-    """Return all impacts of an IAPB run as problems, with each contact's own restitution and
-    friction."""
+    """Return all impacts of an IAPB run as problems, with each contact's own restitution."""
     system = System(scene)
     approach = scene.contact.approach_velocity
     mechanism = system.mechanism
@@ -120,23 +116,10 @@ def problems_of_run(run: Run, scene: Scene) -> list[StruckImpact]:
             continue
         e, mu = _coefficients(system, run, blow.q, np.array(blow.contacts)[closing])
         name = f"impact {number} at {run.time[blow.step]:.4g} s"
-        smooth = ImpactProblem.from_impact(mass, rows[closing], v, e, name=name)
-        rough = None
-        if mu.any():
-            both = _with_tangents(run, scene, mechanism, blow)[closing]
-            said = " to ".join(dict.fromkeys(f"{value:g}" for value in (mu.min(), mu.max())))
-            rough = ImpactProblem.from_impact(
-                mass,
-                both.reshape(-1, mechanism.nv),
-                v,
-                e,
-                mu,
-                contact_size=both.shape[1],
-                name=f"{name}, μ = {said}",
-            )
-        reasons = {PER_BODY: per_body, SCALED: blow.scaled, RUBBING: rubbing and rough is not None}
+        problem = ImpactProblem.from_impact(mass, rows[closing], v, e, name=name)
+        reasons = {PER_BODY: per_body, SCALED: blow.scaled, RUBBING: rubbing and mu.any()}
         other_law = " and ".join(reason for reason, holds in reasons.items() if holds)
-        found.append(StruckImpact(smooth, rough, blow.v_plus, other_law))
+        found.append(StruckImpact(problem, blow.v_plus, other_law))
     return found
 
 
@@ -162,15 +145,6 @@ def _coefficients(
         e[k] = restitution_by_pair(system.scene, pair)[0]
         mu[k] = system.frictions.by_pair(pair)[0]
     return e, mu
-
-
-def _with_tangents(run: Run, scene: Scene, mechanism: Mechanism, blow: _GroupImpact) -> Floats:
-    """Return rows (k, s, d) of the contacts: the normal, then one tangent in 2D or two in 3D."""
-    normals = run.contacts.normal[blow.contacts]
-    tangents = unit_tangents(normals, getattr(scene, "dimensions", 2) == 3)
-    directions = np.concatenate([normals[:, None], tangents], axis=1)
-    each = [_rows_of_step(run, mechanism, blow, along) for along in directions.swapaxes(0, 1)]
-    return np.stack(each, axis=1)
 
 
 class _GroupImpact(NamedTuple):
@@ -237,17 +211,15 @@ def _trees_of_group(run: Run, mechanism: Mechanism, touching: range, group: int)
     return frozenset(trees)
 
 
-def _rows_of_step(
-    run: Run, mechanism: Mechanism, blow: _GroupImpact, directions: Floats | None = None
-) -> Floats:
-    """Return the rows nᵀ(J_a − J_b) (k, d) of the group's contacts, or the rows along other
-    directions (k, 3)."""
+def _rows_of_step(run: Run, mechanism: Mechanism, blow: _GroupImpact) -> Floats:
+    """Return the rows nᵀ(J_a − J_b) (k, d) of the group's contacts."""
     table = run.contacts
     contacts = blow.contacts
-    along = table.normal[contacts] if directions is None else directions
     places = np.tile(blow.q, (len(contacts), 1))
     of_a, of_b = (
-        mechanism.rows_along(places, bodies[contacts], table.point[contacts], along)
+        mechanism.rows_along(
+            places, bodies[contacts], table.point[contacts], table.normal[contacts]
+        )
         for bodies in (table.body_a, table.body_b)
     )
     return of_a - of_b

@@ -11,7 +11,6 @@ project's scenes, hyperstatic families, and patches with friction. They are the 
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -20,9 +19,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from reference.complementarity.benchmark import SolverRow, run_solvers
-from reference.complementarity.problem import ImpactProblem
+from reference.complementarity.problem import SYMMETRY_TOLERANCE, ImpactProblem
 from reference.complementarity.solution import Solution
-from reference.complementarity.solvers import SOLVERS, solver_names
+from reference.complementarity.solvers import SOLVERS
 from reference.datasets import DatasetError, StoredProblem, problem_files, read_problem
 from reference.one_thread import one_thread
 from verification.check import Check, Study
@@ -37,7 +36,6 @@ from verification.table import Row, Table
 
 VERDICTS = ("solved", "refused", "failed", "missing", "left out")
 OWN = "own problems"  # name of the collection that `own_problems` makes
-Progress = Callable[[str, int, int], None]
 
 
 class ProblemStudy(NamedTuple):
@@ -58,50 +56,26 @@ class ProblemStudy(NamedTuple):
 
 
 def study_read(
-    name: str,
     problems: Sequence[StoredProblem],
-    unread: Mapping[str, str] | None = None,
-    longest: float = np.inf,
-    progress: Progress | None = None,
-    failures: list[Failure] | None = None,
+    unread: Mapping[str, str],
+    longest: float,
+    failures: list[Failure] | None,
 ) -> ProblemStudy:
-    """Solve every problem of a collection called `name`; `unread` has the reason for each file that
-    cannot be read."""
-    pairs = sum(len(solver_names(stored.problem)) for stored in problems)
-    say = progress or (lambda *_: None)
-    stage = f"problems of {name}, by every solver"
-    begun = itertools.count()
-    slow = dict[str, float]()
-    say(stage, 0, pairs)
+    """Solve every problem of a collection; `unread` has the reason for each file that cannot be
+    read."""
+    slow = set[str]()
     rows: list[SolverRow] = []
     with one_thread():
-        for friction in {
-            stored.problem.friction is not None for stored in problems
-        }:  # imports and compiles, untimed
+        # imports and compiles, untimed
+        for friction in {stored.problem.friction is not None for stored in problems}:
             size = 3 if friction else 1
-            run_solvers(
-                ImpactProblem.from_delassus(
-                    np.eye(size), -np.eye(size)[0], 0.0, 0.5 if friction else None
-                )
+            first = ImpactProblem.from_delassus(
+                np.eye(size), -np.eye(size)[0], 0.0, 0.5 if friction else None
             )
-        for problem in sorted(
-            (stored.problem for stored in problems), key=lambda problem: problem.size
-        ):
-            rows += (
-                attempt(
-                    problem.name,
-                    partial(
-                        run_solvers,
-                        problem,
-                        longest=longest,
-                        slow=slow,
-                        progress=lambda: say(stage, next(begun), pairs),
-                    ),
-                    failures,
-                )
-                or []
-            )
-    say(stage, pairs, pairs)
+            run_solvers(first, np.inf, slow)
+        for problem in sorted((one.problem for one in problems), key=lambda one: one.size):
+            solving = partial(run_solvers, problem, longest, slow)
+            rows += attempt(problem.name, solving, failures) or []
     names = dict.fromkeys(row.solver for row in rows)
     lines = list[Row]()
     for stored in problems:
@@ -111,7 +85,7 @@ def study_read(
         lines += [line] if line else []
     lines += [
         {"problem": file, **dict.fromkeys(names, "not read"), "why not read": reason}
-        for file, reason in (unread or {}).items()
+        for file, reason in unread.items()
     ]
     return ProblemStudy(tuple(lines), tuple(rows))
 
@@ -134,7 +108,7 @@ def _line(stored: StoredProblem, rows: list[SolverRow], solvers: Mapping[str, An
         "problem": problem.name,
         "unknowns": problem.size,
         "rank": rank,
-        "asymmetry of W": rows[0].asymmetry or None,
+        "asymmetry of W": problem.asymmetry if problem.asymmetry > SYMMETRY_TOLERANCE else None,
         **{name: verdicts.get(name) for name in solvers},
         "spread of velocities": max(
             (row.spread for row in rows if row.verdict == "solved"), default=None
@@ -156,7 +130,7 @@ def on_problems(study: Study, name: str, folder: Path | None) -> ProblemStudy:
             except DatasetError as error:
                 unread[path.name] = str(error)
         given = own_problems(study.failures) if folder is None else read
-        return study_read(name, given, unread, LONGEST[study.depth], failures=study.failures)
+        return study_read(given, unread, LONGEST[study.depth], study.failures)
 
     return study.once(("problems", name), make)
 
