@@ -37,36 +37,35 @@ def random_inertia(rng: np.random.Generator, mass: float) -> Floats:
 
 
 def random_mechanism(
-    rng: np.random.Generator, joints: int, kinds: tuple[str, ...] = tuple(KINDS), trees: int = 1
+    rng: np.random.Generator, joints: int, kinds: tuple[str, ...] = tuple(KINDS)
 ) -> Mechanism:
-    """Return trees of `joints` bodies each, depth first, from chains to bushy trees, with `kinds`
-    of joints."""
+    """Return a tree of bodies, depth first, from a chain to a bushy tree, with `kinds` of
+    joints."""
     bodies: list[Body] = []
-    for tree in range(trees):
-        chain: list[str] = []  # from the root to the newest body
-        bushy = rng.random()
-        for i in range(joints):
-            while len(chain) > 1 and rng.random() < 0.7 * bushy:
-                chain.pop()
-            name = f"body {tree}.{i}"
-            parent = chain[-1] if chain else None
-            kind = str(rng.choice(kinds))
-            mass = 10.0 ** rng.uniform(*MASS_DECADES)
-            x, y, z = rng.normal(size=3).tolist()
-            place = (random_rotation(rng), rng.normal(scale=0.5, size=3))
-            center = rng.normal(scale=0.3, size=3)
-            bodies.append(
-                Body(
-                    name,
-                    parent,
-                    Joint(kind, (x, y, z)),
-                    place,
-                    mass,
-                    center,
-                    random_inertia(rng, mass),
-                )
+    chain: list[str] = []  # from the root to the newest body
+    bushy = rng.random()
+    for i in range(joints):
+        while len(chain) > 1 and rng.random() < 0.7 * bushy:
+            chain.pop()
+        name = f"body {i}"
+        parent = chain[-1] if chain else None
+        kind = str(rng.choice(kinds))
+        mass = 10.0 ** rng.uniform(*MASS_DECADES)
+        x, y, z = rng.normal(size=3).tolist()
+        place = (random_rotation(rng), rng.normal(scale=0.5, size=3))
+        center = rng.normal(scale=0.3, size=3)
+        bodies.append(
+            Body(
+                name,
+                parent,
+                Joint(kind, (x, y, z)),
+                place,
+                mass,
+                center,
+                random_inertia(rng, mass),
             )
-            chain.append(name)
+        )
+        chain.append(name)
     return Mechanism(bodies)
 
 

@@ -21,7 +21,9 @@ from iapb.run import Run
 from iapb.scene import Scene, find_scene, load_scene
 from reference.worlds import run_world
 from verification.finding import (
+    BEYOND,
     DESIGN,
+    MISPRINT,
     NOT_COMPUTED,
     REFUTED,
     REPRODUCED,
@@ -122,10 +124,9 @@ class Check:
     conditions, parts, counts, timed, prose : keys of the columns that are conditions, that split
         the rows into parts, that count the cases of a row, that depend on measured times, and that
         are sentences (see `Column`)
-    roles : MISPRINT or BEYOND for each part, or value of a column of `parts`, that is not the
-        statement of the question
-    by_design : the statement of `verification.proofs` that proves a part, or value of a column of
-        `parts`, in which the code forbids a failure
+    roles : for a part, or a value of a column of `parts`: MISPRINT or BEYOND if it is not the
+        statement of the question; or the statement of `verification.proofs` that proves it, if the
+        code forbids a failure
     draw : (study, region) -> fresh cases inside a region, which confirm it; None if there are no
         fresh cases
     timed_rows : True if the selection of rows depends on measured times
@@ -143,7 +144,6 @@ class Check:
     timed: Collection[str] = ()
     prose: Collection[str] = ()
     roles: Mapping[str, str] = field(default_factory=dict, hash=False)
-    by_design: Mapping[str, str] = field(default_factory=dict, hash=False)
     draw: Callable[[Study, Region], Iterable[Any]] | None = None
     timed_rows: bool = False
 
@@ -186,12 +186,10 @@ class Check:
         parts = []
         for name, rows in by_part(table).items():
             role = _of_part(self.roles, name)
-            proof = _of_part(self.by_design, name)
-            decides = not role and not proof
-            judged = judge_part(name, rows, self._fresh(study, name) if decides else None)
-            parts.append(
-                proved(judged, proof) if proof else replace(judged, role=role or judged.role)
-            )
+            judged = judge_part(name, rows, None if role else self._fresh(study, name))
+            if role in (MISPRINT, BEYOND):
+                judged = replace(judged, role=role)
+            parts.append(proved(judged, role) if role not in ("", MISPRINT, BEYOND) else judged)
         return self._found(parts, table)
 
     def not_computed(self) -> Finding:

@@ -18,7 +18,6 @@ from typing import TypeVar
 import numpy as np
 
 from reference.one_thread import one_thread
-from verification.finding import Failure, attempt
 
 Key = TypeVar("Key")
 Result = TypeVar("Result")
@@ -124,8 +123,6 @@ def take_turns(
     *,
     warm: bool = True,
     enough: float = np.inf,
-    failures: list[Failure] | None = None,
-    name: Callable[[Key], str] = str,
 ) -> dict[Key, Times]:
     """Sample every contestant once per round, in a new random order each round.
 
@@ -136,22 +133,17 @@ def take_turns(
     warm : whether one uncounted round goes first; False if all contestants have just run
     enough : a contestant stops after LEAST_ROUNDS rounds once its samples add up to more than this
         [s]
-    failures : receives a Failure for each contestant that raises; the result leaves these
-        contestants out
-    name : returns the name of a contestant for its Failure
     """
     found: dict[Key, list[float]] = {key: [] for key in contestants}
     order = np.random.default_rng(0)
     with one_thread():
         for turn in range(rounds + warm):
-            going = list(found)
-            for key in (going[k] for k in order.permutation(len(going))):
+            keys = list(found)
+            for key in (keys[k] for k in order.permutation(len(keys))):
                 taken = found[key]
                 if len(taken) >= LEAST_ROUNDS and sum(taken) > enough:
                     continue
-                spent = attempt(name(key), contestants[key], failures)
-                if spent is None:
-                    del found[key]
-                elif turn >= warm:
+                spent = contestants[key]()
+                if turn >= warm:
                     taken.append(spent)
     return {key: Times(tuple(samples)) for key, samples in found.items()}

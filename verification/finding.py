@@ -88,19 +88,12 @@ class Part:
     name : distinguishes the parts of one question; sentence : the result, with its number
     held, decided : trials in which the claim held, and trials that had an outcome; unknown : trials
         without one
-    cases : number of cases in the decided trials, if it is below LEAST_DECIDED
-    region : region in which the part is reproduced, if the verdict is WHERE; fails : conditions of
-        the failed trials
+    region : region in which the part is reproduced, if the verdict is WHERE
     timed : True if measured times enter
-    optional : True if the part needs software that the project does not include; the other parts
-        decide without it
-    miss : one short clause for the first page that says where our method falls short; otherwise ""
     role : "" or DESIGN for the statement of the question; MISPRINT, BEYOND or FEW for what is shown
         beside it and never decides
     proof : name of the statement that proves a part by DESIGN
-    named : the quantity in words, for "fails in ..."; by default the name
-    asked, measured, target : the part as a row of a table, if it has them
-    value, limit, unit, least : a number and its target: at most, or `least`: at least, the limit
+    value, limit, least : a number and its target: at most, or `least`: at least, the limit
     """
 
     sentence: str
@@ -110,20 +103,11 @@ class Part:
     decided: int = 0
     unknown: int = 0
     region: Region | None = None
-    fails: str = ""
     timed: bool = False
-    optional: bool = False
-    cases: int = 0
-    miss: str = ""
     role: str = ""
-    named: str = ""
     proof: str = ""
-    asked: str = ""
-    measured: str = ""
-    target: str = ""
     value: float | None = None
     limit: float | None = None
-    unit: str = ""
     least: bool = False
 
     @classmethod
@@ -132,7 +116,6 @@ class Part:
         name: str,
         value: float | None,
         limit: float,
-        unit: str = "",
         *,
         least: bool = False,
         timed: bool = False,
@@ -145,22 +128,7 @@ class Part:
         if value is not None:
             met = value >= limit if least else value <= limit
             verdict = REPRODUCED if met else REFUTED
-        return cls("", verdict, name, timed=timed, value=value, limit=limit, unit=unit, least=least)
-
-    @classmethod
-    def of(
-        cls, asked: str, measured: str, target: str, verdict: str, name: str = "", **more: Any
-    ) -> Part:
-        """Return a part from what is asked, measured and wanted; its sentence says all three."""
-        return cls(
-            f"{asked}: {measured}. Target: {target}.",
-            verdict,
-            name,
-            asked=asked,
-            measured=measured,
-            target=target,
-            **more,
-        )
+        return cls("", verdict, name, timed=timed, value=value, limit=limit, least=least)
 
     @property
     def failed(self) -> int:
@@ -201,8 +169,6 @@ class Finding:
     verdict : one of VERDICTS; parts : the parts that give the verdict
     tables : the data, by name; a figure refers to a table as "<key>/<name>"
     details : further information by label (place, tolerance, source, law ...)
-    axes : keys of the columns for a map of the outcome: horizontal axis, vertical axis, and one map
-        per value
     failures : the cases that raised an exception; the tables lack their rows
     timed : True if the verdict or the answer depends on measured times
     """
@@ -215,7 +181,6 @@ class Finding:
     parts: tuple[Part, ...] = ()
     tables: Mapping[str, Table] = field(default_factory=dict)
     details: Mapping[str, str] = field(default_factory=dict)
-    axes: tuple[str, ...] = ()
     failures: tuple[Failure, ...] = ()
     timed: bool = False
 
@@ -230,7 +195,7 @@ class Finding:
         question."""
         stated = [part for part in self.parts if part.role in DECIDING]
         refuted, mixed = (
-            [part.named or part.name for part in stated if part.verdict == verdict]
+            [part.name for part in stated if part.verdict == verdict]
             for verdict in (REFUTED, MIXED)
         )
         judged = sum(part.verdict != NOT_COMPUTED for part in stated)
@@ -252,11 +217,6 @@ class Finding:
     def computed(self) -> bool:
         """Whether the study gave a result."""
         return self.verdict != NOT_COMPUTED
-
-    @property
-    def miss(self) -> str:
-        """The clauses of all parts that say where our method falls short; "" if there is none."""
-        return "; ".join(part.miss for part in self.parts if part.miss)
 
 
 def _listed(before: str, names: Iterable[str]) -> str:
@@ -349,15 +309,12 @@ def verdict_of(parts: Iterable[Part]) -> str:
     """Return the verdict of a finding: that of its worst part.
 
     A part with a role that does not decide counts only if it has too few trials and no other part
-    decides. An optional part without any decided trial counts only if there is no other part.
+    decides.
     """
     every = tuple(parts)
-    given = [part for part in every if part.role in DECIDING] or [
-        part for part in every if part.role == FEW
-    ]
-    absent = [part.optional and part.verdict == NOT_TESTABLE and not part.decided for part in given]
-    counted = [part for part, left_out in zip(given, absent, strict=True) if not left_out] or given
-    return worst(part.verdict for part in counted)
+    deciding = [part for part in every if part.role in DECIDING]
+    few = [part for part in every if part.role == FEW]
+    return worst(part.verdict for part in deciding or few)
 
 
 def with_failures(finding: Finding, failures: Sequence[Failure]) -> Finding:

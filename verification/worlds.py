@@ -47,6 +47,7 @@ from reference.worlds import WORLDS, run_world
 from verification.complementarity.agreement import PUSHED, SAME, distances
 from verification.complementarity.of_runs import StruckImpact, problems_of_run
 from verification.finding import (
+    BEYOND,
     MIXED,
     NOT_TESTABLE,
     REPRODUCED,
@@ -192,7 +193,7 @@ def compare_worlds(
         judging = partial(compare_impacts, runs["IAPB"][0], scene, failures)
         if judged := attempt("impacts", judging, failures):
             parts.append(judged)
-            headline += [judged.sentence] if judged.decided else []
+            headline.append(judged.sentence)
     finding = finding_of(
         f"worlds of {scene.name}",
         scene.title or scene.name,
@@ -410,10 +411,12 @@ def _answer(
     )
 
 
-def compare_impacts(run: Run, scene: Scene, failures: list[Failure]) -> Part:
+def compare_impacts(run: Run, scene: Scene, failures: list[Failure]) -> Part | None:
     """Return the part on IAPB's velocities and those of the LCP, which are equal if all contacts
-    push."""
+    push; None without an impact."""
     struck = problems_of_run(run, scene)
+    if not struck:
+        return None
     alike = [one for one in struck if not one.other_law][:IMPACTS]
     pairs = [attempt(one.problem.name, partial(_apart, one), failures) for one in alike]
     compared = [pair for pair in pairs if pair is not None]
@@ -423,7 +426,7 @@ def compare_impacts(run: Run, scene: Scene, failures: list[Failure]) -> Part:
         besides = f" In {unequal} contacts differ in e: there IAPB uses Poisson's law.{besides}"
     if not compared:
         said = f"No impact of IAPB is compared with the LCP.{besides}"
-        return Part(said, NOT_TESTABLE, "motion", optional=True)
+        return Part(said, NOT_TESTABLE, "motion", role=BEYOND)
     agree = sum(distance <= SAME for distance, _ in compared)
     pulled = sum(outside > PUSHED for _, outside in compared)
     said = (

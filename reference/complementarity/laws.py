@@ -52,14 +52,14 @@ def newton_lcp(problem: ImpactProblem, solver: str | None = None) -> Outcome:
     return Outcome(problem.velocity_plus(impulse), impulse, residual)
 
 
-def poisson(problem: ImpactProblem, solver: str | None = None) -> Outcome:
+def poisson(problem: ImpactProblem) -> Outcome:
     """Apply Poisson's law, p = p_c + p_e: 0 <= p_c ⟂ gamma_c >= 0, then 0 <= p_e − E p_c ⟂
     gamma_plus >= 0."""
     compression = replace(problem, restitution=np.zeros(problem.contacts))
-    p_c, first = _solved(compression, solver)
+    p_c, first = _solved(compression)
     returned = problem.restitution * p_c
     bounced = replace(compression, gamma_minus=problem.gamma_plus(p_c + returned))
-    extra, second = _solved(bounced, solver, velocity_scale(problem))
+    extra, second = _solved(bounced, speed=velocity_scale(problem))
     impulse = p_c + returned + extra
     return Outcome(problem.velocity_plus(impulse), impulse, max(first, second))
 
@@ -124,7 +124,9 @@ def unpushed_share(columns: np.ndarray, goal: np.ndarray) -> float:
         raise SolverError(f"non-negative least squares: {error}") from error
 
 
-def _solved(problem: ImpactProblem, solver: str | None, speed: float = 0.0) -> tuple[Floats, float]:
+def _solved(
+    problem: ImpactProblem, solver: str | None = None, speed: float = 0.0
+) -> tuple[Floats, float]:
     """Return p (n,) and its recomputed residual, by that solver or the first of LADDER that reaches
     LAW_TOLERANCE."""
     # Relative to `speed` [m/s] if the problem's own velocities are smaller: after compression, only

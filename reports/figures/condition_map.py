@@ -8,9 +8,6 @@ holds.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from types import MappingProxyType
-
 import numpy as np
 
 from reports.figures.figure import Figure, Panel
@@ -35,15 +32,12 @@ def condition_map(
     x: str,
     y: str,
     *split: str,
-    words: Mapping[str, str] = MappingProxyType({}),
 ) -> Figure:
     """Draw the outcomes over the columns x and y, in one panel for every combination of the columns
     in `split`.
 
     An axis of few values shows their ranks, with a tick for each value, so that close values are
     drawn apart.
-
-    words : the words for a text in the heading of a panel
     """
     units = {column.key: _SHOWN.get(column.unit, (column.unit, 1.0)) for column in table.columns}
     titles = {key: f"{key} [{unit}]" if unit else key for key, (unit, _) in units.items()}
@@ -52,7 +46,7 @@ def condition_map(
     panels: dict[str, dict[tuple[float, float], list[bool | None]]] = {}
     for row, held in zip(table.records(), table.holds, strict=True):
         panel = ", ".join(
-            words.get(row[key], row[key])
+            row[key]
             if isinstance(row[key], str)
             else f"{titles[key]}: {units[key][1] * row[key]:.3g}"
             for key in split

@@ -38,15 +38,14 @@ class Panel:
         return self.svg.startswith("<table")
 
 
-def cell(text: str | Markup, note: str = "", color: str = "", strength: float = 0.0) -> Markup:
-    """Return a cell of a table: its text, a smaller note, and a colour of the text or, with a
-    strength, of the cell."""
+def cell(text: str | Markup, *, color: str = "", strength: float = 0.0) -> Markup:
+    """Return a cell of a table: its text, and a colour of the text or, with a strength, of the
+    cell."""
     look = f"color: {css(color)}" if color else ""
     if strength:
         look = f"background: color-mix(in srgb, {css(color)} {100 * strength:g}%, transparent)"
     style = Markup(' style="{}"').format(look) if look else ""
-    small = Markup("<small>{}</small>").format(note) if note else ""
-    return Markup("<td{}>{}{}</td>").format(style, text, small)
+    return Markup("<td{}>{}</td>").format(style, text)
 
 
 def grid(columns: Sequence[str], rows: Mapping[str, Sequence[Markup]], kind: str = "") -> str:
@@ -96,7 +95,6 @@ class Figure:
         statement
     claims : the claims that it shows
     dots : columns of `numbers` that are drawn as dots
-    section : the section of the report that has it
     """
 
     key: str
@@ -112,7 +110,6 @@ class Figure:
     same: Mapping[str, bool] = field(default_factory=dict)
     dots: tuple[str, ...] = ()
     claims: tuple[str, ...] = ()
-    section: str = "figures"
 
 
 def statements(figures: Iterable[Figure]) -> Table:
@@ -176,7 +173,6 @@ def draw(
         text.get("number", ""),
         text["title"],
         missing=missing,
-        section=text.get("section", "figures"),
     )
 
     def drawn() -> Figure:
@@ -213,8 +209,7 @@ _FONT = 'font-family="DejaVu Sans, Verdana, sans-serif" font-size="11"'
 _TABLE = (
     "body { font: 14px/1.4 Verdana, sans-serif } table { border-collapse: collapse } th { "
     "font-weight: 400 } "
-    "td, th { padding: .3em .6em; text-align: center; border: 2px solid #fff } small { display: "
-    "block } "
+    "td, th { padding: .3em .6em; text-align: center; border: 2px solid #fff } "
     "th[scope=row], .plain * { text-align: left } .swatch { width: 36px; height: 14px } "
     "li { list-style: none }"
 )

@@ -48,7 +48,6 @@ class Plot:
     kind : TIME or PATH if the page's script reads values from the curves
     bare : whether to hide the axes: a canvas for shapes, by default as large as the drawing
     shape : rows and columns of axes, placed by the layout
-    frames : places of the axes in the drawing (left, bottom, width, height), instead of a layout
 
     Attributes
     ----------
@@ -65,14 +64,12 @@ class Plot:
         kind: str = "",
         bare: bool = False,
         shape: tuple[int, int] = (1, 1),
-        frames: Sequence[Sequence[float]] = (),
     ) -> None:
         self.key = key
         self.size = size
         self.kind = kind
         self.bare = bare
         self.shape = shape
-        self.frames = frames or ([(0.0, 0.0, 1.0, 1.0)] if bare else [])
         self.svg = ""
         self.words: dict[str, str] = {}
         self.drawing: Any
@@ -85,17 +82,14 @@ class Plot:
         self._style = matplotlib.rc_context(PARAMETERS)
         self._style.__enter__()
         self.drawing = Figure(
-            figsize=self.size, dpi=72, layout=None if self.frames else "constrained"
+            figsize=self.size, dpi=72, layout=None if self.bare else "constrained"
         )
-        self.each = (
-            [self.drawing.add_axes(frame) for frame in self.frames]
-            if self.frames
-            else list(self.drawing.subplots(*self.shape, squeeze=False).ravel())
-        )
-        self.axes = self.each[0]
         if self.bare:
-            for axes in self.each:
-                axes.set_axis_off()
+            self.each = [self.drawing.add_axes((0.0, 0.0, 1.0, 1.0))]
+            self.each[0].set_axis_off()
+        else:
+            self.each = list(self.drawing.subplots(*self.shape, squeeze=False).ravel())
+        self.axes = self.each[0]
         return self
 
     def __exit__(
@@ -219,9 +213,9 @@ class Canvas(Plot):
         self.axes.set(**self.limits)
         return self
 
-    def walls(self, scene: Mapping[str, Any], reach: float = 1.0) -> None:
+    def walls(self, scene: Mapping[str, Any]) -> None:
         """Fill the static world."""
-        for corners in wall_outlines(scene, reach):
+        for corners in wall_outlines(scene, reach=1.0):
             self.axes.fill(*corners.T, facecolor=WALL, edgecolor="none", zorder=1)
 
     def bodies(self, scene: Mapping[str, Any], pose: Floats | None = None) -> None:

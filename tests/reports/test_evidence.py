@@ -63,7 +63,7 @@ FINDING = finding_of(
     "Title",
     "Asked?",
     "Answered.",
-    (Part("s", VERDICTS[0], name="p", held=1, decided=2, fails="x", timed=True),),
+    (Part("s", VERDICTS[0], name="p", held=1, decided=2, timed=True),),
     {
         "judged": Table(
             (

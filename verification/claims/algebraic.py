@@ -196,8 +196,7 @@ def losses(
             EXACT_LOSS: Measure(_exact_misfits),
         },
         exact=([family for family in families if family.condition_number == first], (0.5,)),
-        roles={AS_PRINTED: MISPRINT},
-        by_design={PASSIVE: proof},
+        roles={AS_PRINTED: MISPRINT, PASSIVE: proof},
         draw=_halved,
         holds=_loss_holds,
     )
@@ -510,7 +509,7 @@ _PASSIVE = batches(
         RANDOM: Measure(energy_gains, energy_bound),
         EXACT: NEVER_GAINS,
     },
-    by_design={RANDOM: "theorem_2"} | {parts[0]: "scaled_impulse" for parts in RENDERED.values()},
+    roles={RANDOM: "theorem_2"} | {parts[0]: "scaled_impulse" for parts in RENDERED.values()},
 )
 
 
@@ -610,8 +609,7 @@ C09 = Check(
     row=_without_impulse,
     holds=_moves_nothing,
     parts=["part"],
-    roles={ALMOST: BEYOND},
-    by_design={RESOLVER: "scaled_impulse", TRAJECTORY: "scaled_impulse"},
+    roles={ALMOST: BEYOND, RESOLVER: "scaled_impulse", TRAJECTORY: "scaled_impulse"},
     counts=["impacts"],
     conditions=[*START, "contacts"],
 )

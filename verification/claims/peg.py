@@ -69,7 +69,6 @@ RESOLVED_FORCE = {"x": 0.004, "y": 0.006, "rotation": 4.5e-4}
 RESOLVED[ALL_THREE] = float(
     np.linalg.norm([RESOLVED["x"], RESOLVED["y"], ARM * RESOLVED["rotation"]])
 )
-NAMED = {"x": "x", "y": "y", "rotation": "rotation", ALL_THREE: "all three together"}
 LIMITED = (*START, "force_limit")
 PAPERS = Condition().collision_threshold
 LARGER = "larger threshold"

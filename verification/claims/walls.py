@@ -82,7 +82,7 @@ C17 = Check(
     row=_losses,
     conditions=["tilt", "stiffness", "damping"],
     holds=lambda row: bool(row["error"] <= ROUNDING_OF_LOSS) if row["impacts"] else None,
-    by_design={"loss": "loss_without_stiffness"},
+    roles={"loss": "loss_without_stiffness"},
     parts=["part"],
 )
 

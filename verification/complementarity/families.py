@@ -42,19 +42,20 @@ def random_cases(
                     )
 
 
-def two_contacts(
-    cosine: float, speed_ratio: float, rng: np.random.Generator, coordinates: int = 4
-) -> ImpactCase:
+_COORDINATES = 4  # of the impacts at two contacts
+
+
+def two_contacts(cosine: float, speed_ratio: float, rng: np.random.Generator) -> ImpactCase:
     """Return an impact at two contacts whose unit rows have this cosine in the kinetic metric.
 
     The contacts approach at speeds 1 and `speed_ratio`. The lengths of the rows, the mass matrix
     and the velocity components orthogonal to both rows are random.
     """
-    frame = np.linalg.qr(rng.normal(size=(coordinates, coordinates)))[0]
+    frame = np.linalg.qr(rng.normal(size=(_COORDINATES, _COORDINATES)))[0]
     rows = np.array([[1.0, 0.0], [cosine, np.sqrt(1.0 - cosine**2)]]) @ frame[:2]
     closing = np.linalg.solve(rows @ frame[:2].T, [-1.0, -speed_ratio])
-    u = frame.T @ np.concatenate([closing, rng.normal(size=coordinates - 2)])
-    lower = np.linalg.cholesky(random_mass_matrix(rng, coordinates))
+    u = frame.T @ np.concatenate([closing, rng.normal(size=_COORDINATES - 2)])
+    lower = np.linalg.cholesky(random_mass_matrix(rng, _COORDINATES))
     lengths = np.exp(rng.normal(size=(2, 1)))
     velocity = np.linalg.solve(lower.T, u)
     return ImpactCase(lower @ lower.T, lengths * (rows @ lower.T), velocity, 0.0, "two contacts")

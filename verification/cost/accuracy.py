@@ -9,7 +9,7 @@ compiled or from Python. Methods that can be stopped early run with several amou
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
@@ -107,7 +107,6 @@ def _hard(sizes: Iterable[tuple[int, int]]) -> list[Hard]:
 def work_precision(
     sizes: Iterable[tuple[int, int]] = SIZES,
     rounds: int = ROUNDS,
-    ways: Sequence[Way] = WAYS,
     progress: Callable[[int, int], None] | None = None,
     failures: list[Failure] | None = None,
 ) -> Table:
@@ -118,7 +117,6 @@ def work_precision(
     sizes : (contacts, coordinates) of each size
     rounds : number of times that each method is timed, in random order, each time after a warm-up
         call
-    ways : methods, each with an amount of work
     progress : called as progress(impacts done, number of impacts)
     failures : receives exceptions other than `IapbError`, which gives a row; if it is None, they
         propagate
@@ -134,16 +132,16 @@ def work_precision(
     study = Study(failures=failures)
     cases = _hard(sizes)
     each = counted(cases, progress) if progress else cases
-    return ACCURACY.table_of(study.each(each, partial(_measured, ways, rounds, study)))
+    return ACCURACY.table_of(study.each(each, partial(_measured, rounds, study)))
 
 
-def _measured(ways: Sequence[Way], rounds: int, study: Study, case: Hard) -> Iterator[Row]:
+def _measured(rounds: int, study: Study, case: Hard) -> Iterator[Row]:
     """Yield the rows of one impact; a way that was too slow on an earlier impact is not tried
     again."""
     problem = timed_problems(*case[:2])[case.number]
     slow: set[Way] = study.once("slow", set)
     made: dict[Way, Call] = {}
-    ways = [way for way in ways if way.rows < case.coordinates]
+    ways = [way for way in WAYS if way.rows < case.coordinates]
 
     def tried(way: Way) -> tuple[Floats | str, float]:
         try:
@@ -240,7 +238,7 @@ ACCURACY = Check(
     key="accuracy",
     question="How exact is an impact in the time that it takes?",
     cases=lambda _: _hard(SIZES),
-    row=partial(_measured, WAYS, ROUNDS),
+    row=partial(_measured, ROUNDS),
     timed=MEASURED,
     timed_rows=True,
 )
@@ -458,17 +456,9 @@ def numbers_of(best: Table) -> Row:
 TRUNCATED = ((6, 24), (12, 60), (30, 120))  # (d, c), rows of rank two thirds of d
 
 
-class Stopped(NamedTuple):
-    """Random impacts of d coordinates and c contacts, stopped after a budget of rows."""
-
-    d: int
-    c: int
-    budget: int
-
-
-def stopped(study: Study, case: Stopped) -> Row:
-    """Resolve random plastic impacts with a row budget and return the worst and the typical of
-    them."""
+def stopped(study: Study, case: tuple[int, int, int]) -> Row:
+    """Resolve random plastic impacts of d coordinates and c contacts with a row budget and return
+    the worst and the typical of them."""
     d, c, budget = case
     impacts = [
         random_impact(d, c, np.random.default_rng([0, d, c, k]), 0.0)
@@ -508,5 +498,5 @@ BUDGET_ROWS = Check(
     question="What does an impact give that stops early?",
     row=stopped,
     targets=budget_targets,
-    cases=lambda _: [Stopped(d, c, k) for d, c in TRUNCATED for k in range((2 * d) // 3 + 1)],
+    cases=lambda _: [(d, c, k) for d, c in TRUNCATED for k in range((2 * d) // 3 + 1)],
 )

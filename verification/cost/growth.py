@@ -116,9 +116,9 @@ def call_times(
     return times, typical
 
 
-def most_contacts(trials: Table, method: str, d: int, deadline: str = MILLISECOND) -> int:
-    """Return the largest number of contacts in time; 0 if no size is in time."""
-    rows = trials.where(deadline=deadline, method=TITLES[method], coordinates=d).records()
+def most_contacts(trials: Table, method: str, d: int) -> int:
+    """Return the largest number of contacts within a millisecond; 0 if no size is in time."""
+    rows = trials.where(deadline=MILLISECOND, method=TITLES[method], coordinates=d).records()
     return max((row["contacts"] for row in rows if row["late calls"] <= ALLOWED), default=0)
 
 

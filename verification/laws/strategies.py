@@ -17,7 +17,7 @@ from verification.laws.counterexample import tangents_are_independent
 
 
 @st.composite
-def mass_matrices(draw: st.DrawFn, d: int, largest_exponent: int = 8) -> Floats:
+def mass_matrices(draw: st.DrawFn, d: int, largest_exponent: int) -> Floats:
     """M = T D Tᵀ with T unit triangular of small integers and D powers of ten; κ is up to about
     10^largest_exponent."""
     powers = draw(st.lists(st.integers(-largest_exponent, 0), min_size=d, max_size=d))
@@ -28,10 +28,10 @@ def mass_matrices(draw: st.DrawFn, d: int, largest_exponent: int = 8) -> Floats:
 
 
 @st.composite
-def contact_jacobians(draw: st.DrawFn, d: int, largest: int = 5) -> Floats:
+def contact_jacobians(draw: st.DrawFn, d: int) -> Floats:
     """Rows of integers; some are close to the previous row, at a distance of a power of ten, and
     some are zero."""
-    c = draw(st.integers(0, largest))
+    c = draw(st.integers(0, 5))
     rows = np.zeros((c, d))
     for i in range(c):
         rows[i] = draw(st.lists(st.integers(-3, 3), min_size=d, max_size=d))
@@ -62,9 +62,9 @@ def unequal_cases(draw: st.DrawFn, largest_exponent: int = 8) -> ImpactCase:
 
 
 @st.composite
-def impact_cases(draw: st.DrawFn, largest_exponent: int = 8, largest_size: int = 4) -> ImpactCase:
+def impact_cases(draw: st.DrawFn, largest_exponent: int = 8) -> ImpactCase:
     """An impact with κ(M) up to about 10^largest_exponent."""
-    d = draw(st.integers(1, largest_size))
+    d = draw(st.integers(1, 4))
     e = st.sampled_from([1.0, 0.0, -1.0, 0.5]) | st.floats(-1.0, 1.0)
     if draw(st.booleans()):
         powers = draw(st.lists(st.integers(-4, 0), min_size=d, max_size=d))

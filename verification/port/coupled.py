@@ -77,7 +77,6 @@ def wall_scene(
     stiffness: float,
     damping: float,
     rate: float = 512.0,
-    mass: float = 2.0,
     limit: float | None = None,
 ) -> Scene:
     """Return a disc that slides along x to a wall at x = 0, with e = 0 and the gains of Table I.
@@ -90,7 +89,7 @@ def wall_scene(
         "name": "tool",
         "joint": "prismatic",
         "axis": [1, 0],
-        "mass": mass,
+        "mass": 2.0,
         "shapes": [{"kind": "circle", "radius": RADIUS}],
         "position": [-RADIUS - CLEARANCE],
     }

@@ -85,20 +85,6 @@ def test_a_finding_is_never_better_than_its_worst_part(verdicts, verdict):
 
 
 @pytest.mark.parametrize(
-    ("part", "verdict"),
-    [
-        (Part("", NOT_TESTABLE, optional=True), REPRODUCED),
-        (Part("", NOT_TESTABLE), NOT_TESTABLE),
-        (Part("", NOT_TESTABLE, held=9, decided=9, optional=True), NOT_TESTABLE),
-        (Part("", REFUTED, optional=True), REFUTED),
-    ],
-)
-def test_only_an_optional_part_that_is_absent_is_left_out(part, verdict):
-    assert verdict_of([Part("", REPRODUCED), part]) == verdict
-    assert verdict_of([Part("", NOT_TESTABLE, optional=True)]) == NOT_TESTABLE
-
-
-@pytest.mark.parametrize(
     ("parts", "outcome", "kind"),
     [
         ([(REPRODUCED, ""), (REFUTED, MISPRINT), (REFUTED, BEYOND)], "holds, misprint", MISPRINTED),
@@ -121,7 +107,7 @@ def test_the_outcome_of_a_claim_follows_from_the_parts_that_the_paper_states(par
         "",
         "",
         [
-            Part("", verdict, role=role, named=name)
+            Part("", verdict, name, role=role)
             for name, (verdict, role) in zip(named, parts, strict=False)
         ],
     )
@@ -140,7 +126,7 @@ def test_a_part_by_design_has_the_verdict_of_its_proof_and_hides_no_failure(
     monkeypatch.setattr(
         check, "check_proof", lambda name: SimpleNamespace(holds=name == "theorem_1")
     )
-    claim = replace(CLAIM, by_design={"x": statement})
+    claim = replace(CLAIM, roles={"x": statement})
     rows = [{"part": "x", "error": error}, *({"part": "y", "error": 0.5} for _ in range(20))]
     found = claim.conclude(claim.table_of(rows))
     part, other = found.parts

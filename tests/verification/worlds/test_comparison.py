@@ -111,7 +111,7 @@ def test_worlds_that_stop_early_or_are_not_to_be_trusted_are_not_ranked(monkeypa
     # nearest, for it stopped
     assert row(found, "PB")["configuration, rms"] < row(found, "ideal")["configuration, rms"]
     assert "Closest to IAPB is ideal" in found.answer and "Not ranked: PB" in found.answer
-    part = found.parts[0]
+    (part,) = found.parts
     assert (part.verdict, part.held, part.decided) == (MIXED, 2, 4)
     alone = compare_worlds(short, ["IAPB", "PB"], "PB")
     assert "the reference PB stopped" in alone.answer
