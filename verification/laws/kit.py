@@ -23,7 +23,7 @@ from verification.impacts import (
     with_unequal_restitution,
 )
 from verification.laws.bounds import KIT, Bounds, Law, LawCount
-from verification.laws.child import Child, child_of, shown_arguments
+from verification.laws.child import Child, child_of
 from verification.laws.contracts import CONTRACTS, EXACT_LAWS, OF_VARIANTS, Contract
 from verification.laws.counterexample import (
     HANGS,
@@ -265,7 +265,13 @@ def _shown(one: Counterexample) -> Iterator[str]:
     for number, (given, answer) in enumerate(calls, 1):
         if len(calls) > 1:
             yield f"call {number} of {len(calls)} that the law makes:"
-        yield from shown_arguments(given, answer)
+        names = ("M", "J", "v", "e") if len(given) == 4 else ("M", "J", "T", "v", "e", "μ")
+        for name, value in zip((*names, "returned"), (*given, answer), strict=True):
+            lead = f"  {name} = "
+            text = value
+            if not isinstance(value, str):
+                text = np.array2string(np.asarray(value), precision=9, threshold=400)
+            yield lead + text.replace("\n", "\n" + " " * len(lead))
 
 
 def check_passivity(
@@ -313,8 +319,7 @@ def check_passivity(
         range(Jᵀ), momentum, repeatable bits, unchanged arguments.
     patience : time limit [s] after which no further impact is tried; the report then fails and says
         why.
-    call_limit : time limit [s] of one call. A call that takes longer is named on stderr with its
-        impact, while it runs.
+    call_limit : time limit [s] of one call in a process of its own.
     own_process : whether the resolver is called in a process of its own. A call that takes longer
         than `call_limit` is then ended and breaks the laws, as does one that ends the process. Each
         call takes 0.1 to 0.3 ms longer, and what the resolver remembers is not seen here.
@@ -359,11 +364,10 @@ def check_passivity(
     verdicts = {name: LawVerdict(name, statement=law.statement) for name, law in chosen.items()}
     # this loads the solver that the draws use, so that fresh resolvers need not
     terms.draw(np.random.default_rng(seed), 0, condition)
-    with one_thread(), child_of(resolver, call_limit, name_of(resolver)) as child:
+    with one_thread(), child_of(resolver, call_limit) as child:
         if own_process and child is None:
             raise ArgumentError("own_process", True, "False where no process can be forked")
-        called = child if own_process and child else resolver
-        watched = Watched(called, child.note if child and not own_process else None)
+        watched = Watched(child if own_process and child else resolver)
         trial = _Trial(watched, bounds, terms, int(impacts), seed, condition, chosen, verdicts)
         done = _try_all(trial, ends, progress)
         hunts = _Hunts(trial, resolver, child, search, contract, ends, progress)

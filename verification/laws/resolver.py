@@ -31,32 +31,22 @@ class Watched:
         in double-double.
     calls : the pickled arguments of the last calls.
     changed, rounded : answers other than v⁻ and 0, and those of them that fit in single precision.
-    note : told the pickled arguments before each call, and b"" after it.
     """
 
-    def __init__(self, resolver: Resolver, note: Callable[[bytes], None] | None = None) -> None:
+    def __init__(self, resolver: Resolver) -> None:
         self.resolver = resolver
-        self.note = note
         self.suspects: list[tuple[ImpactCase, Floats]] = []
         self.calls: deque[bytes] = deque(maxlen=REMEMBERED)
         self.changed = 0
         self.rounded = 0
 
     def __call__(self, *given: Any) -> Any:
-        pickled = pickle.dumps(given)
-        self.calls.append(pickled)
-        if self.note is None:
-            return self.resolver(*given)
-        self.note(pickled)
-        try:
-            return self.resolver(*given)
-        finally:
-            self.note(b"")
+        self.calls.append(pickle.dumps(given))
+        return self.resolver(*given)
 
     def forget(self) -> None:
         """Drop what belongs to the check: reports travel between processes."""
         self.resolver = print
-        self.note = None
         self.calls.clear()
 
     def look_at(self, case: ImpactCase, v_plus: Floats) -> None:
