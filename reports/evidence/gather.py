@@ -82,31 +82,19 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
         if ahead is not None and fresh:
             ahead.failures.clear()  # the topic has tried these cases again
 
-    def finding(name: str, said: Callable[..., Finding]) -> Finding:
-        stage = stages[name]
-        return (
-            said(stage.records or (), stage.failures)
-            if stage.records or not stage.failures
-            else _failed(stage)
-        )
-
     ledger = tuple(
         sorted(
             (claim for name in CLAIM_STAGES for claim in stages[name].records or ()),
             key=lambda claim: claim.key,
         )
     )
-    topics = [stages[name].records or _failed(stages[name]) for name in TOPICS]
-    topics.append(finding("proofs", partial(on_proofs, development=checked.read())))
-    topics = [
-        haptic_rate.quoting(topic, (*ledger, *topics))
-        if topic.key == haptic_rate.TOPIC.key
-        else topic
-        for topic in topics
-    ]
-    topics = [
-        _failed(stages[name]) for name in CLAIM_STAGES if stages[name].records is None
-    ] + topics
+    topics = [_failed(stages[name]) for name in CLAIM_STAGES if stages[name].records is None]
+    for name in TOPICS:
+        topic = stages[name].records or _failed(stages[name])
+        topics.append(
+            haptic_rate.quoting(topic, ledger) if name == haptic_rate.TOPIC.key else topic
+        )
+    topics.append(_on_proofs(stages["proofs"]))
     scenes = {name: runs.shipped_scene(name).resolved() for name in SHOWN_SCENES}
     facts = provenance()
     scene_effects = dict(stages["effects"].records or {})
@@ -145,6 +133,12 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
         runs=tuple(runner.used.values()),
         seconds=seconds,
     )
+
+
+def _on_proofs(stage: Stage) -> Finding:
+    if stage.failures and not stage.records:
+        return _failed(stage)
+    return on_proofs(stage.records or (), stage.failures, development=checked.read())
 
 
 def _failed(stage: Stage) -> Finding:

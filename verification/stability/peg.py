@@ -11,7 +11,7 @@ import numpy as np
 
 from verification.check import Check, Study
 from verification.finding import Part
-from verification.scenes.measures import bounces, deepest_penetration, settling_time, trace_of
+from verification.scenes.measures import bounces, settling_time, trace_of
 from verification.table import Table
 
 SCENE = "peg_corner"
@@ -47,8 +47,6 @@ def _contacts(study: Study, case: tuple[str, float, float]) -> Iterator[dict[str
             "world": run.world,
             "settles after [s]": settling_time(trace) if run.complete else None,
             "bounces": bounces(trace),
-            "penetration [mm]": 1e3 * deepest_penetration(trace),
-            "run stopped because": run.stopped,
         }
 
 

@@ -3,7 +3,6 @@ rate-hardness."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -87,16 +86,12 @@ def _hardness(study: Study, loop: Loop) -> Iterator[Row]:
     at = int(np.flatnonzero(damping == PAPER_DAMPING)[0])
     for law, one in zip(LAWS, _maps(study, loop), strict=True):
         for i, K in enumerate(stiffness):
-            settling = float(one.settling_time[at, i])
             yield {
                 **_loop(loop),
                 "law": law,
                 "stiffness [N/m]": float(K),
                 "rate-hardness [N/m]": float(one.rate_hardness[at, i]),
-                "settles after [s]": settling if math.isfinite(settling) else None,
                 "penetration [mm]": 1e3 * float(one.penetration[at, i]),
-                "bounces": int(one.bounces[at, i]),
-                "peak force [N]": float(one.peak_force[at, i]),
             }
 
 
@@ -127,12 +122,6 @@ MAPS = Check(
     row=_marks,
     targets=_of_maps,
 )
-DAMPINGS = Check(
-    key="dampings",
-    question="Which dampings do the maps have?",
-    cases=lambda study: grid(study.depth)[1],
-    row=lambda study, B: {"damping [N s/m]": float(B)},
-)
 HARDNESS = Check(
     key="hardness",
     question="How hard does a wall feel?",
@@ -156,6 +145,6 @@ contact_stability = Topic(
     "and we measure the energy that it draws from the loop. Colgate's condition, b >= KT/2 + |B| "
     "with the period T, "
     "makes a wall of spring and damper passive for every hand, if the sensors are ideal.",
-    checks=(MAPS, DAMPINGS, HARDNESS, PEG, PORT, EDGES),
+    checks=(MAPS, HARDNESS, PEG, PORT, EDGES),
     numbers=port_numbers,
 )

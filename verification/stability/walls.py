@@ -79,32 +79,24 @@ class Contact:
 
     settled : whether in the last quarter of the time the mass is still and never leaves the wall,
         and has not grown
-    settling_time : time from the first contact to the last motion [s], infinite if the mass still
-        moves at the end
+    settles_after : time from the first contact to the last motion [s], infinite if it has not
+        settled
     grown : whether the mass exceeds GROWN times its initial speed later than 1 s after the first
         contact at any wall
-    bounces : number of times that the mass leaves the wall
-    penetration : largest penetration [m]; peak_force : largest force [N]
+    penetration : largest penetration [m]
     rate_hardness : first rate of the force over the first speed [N/m] (Lawrence et al. 2000)
     """
 
     settled: NDArray[np.bool_]
-    settling_time: Floats
+    settles_after: Floats
     grown: NDArray[np.bool_]
-    bounces: NDArray[np.int64]
     penetration: Floats
     rate_hardness: Floats
-    peak_force: Floats
 
     @property
     def outcomes(self) -> NDArray[np.str_]:
         """SETTLES, BOUNCES_ON or GROWS for each wall."""
         return np.where(self.grown, GROWS, np.where(self.settled, SETTLES, BOUNCES_ON))
-
-    @property
-    def settles_after(self) -> Floats:
-        """Settling time [s]; infinite if the mass does not settle."""
-        return np.where(self.settled, self.settling_time, np.inf)
 
 
 def touch_walls(loop: Loop, stiffness: Floats, damping: Floats, law: str) -> Contact:
@@ -179,14 +171,13 @@ def _watched(loop: Loop, positions: Floats, speeds: Floats, forces: Floats) -> C
     settled = (last_moving < (1.0 - _LAST) * steps) & ~bouncing
     grown = (np.abs(speeds[time > time[first].min() + 1.0]) > GROWN * loop.speed).any(axis=0)
     first_force = np.take_along_axis(forces, (forces > 0.0).argmax(axis=0)[None], axis=0)[0]
+    settled &= ~grown
     return Contact(
-        settled & ~grown,
+        settled,
         np.where(settled, np.maximum(time[last_moving] - time[first], 0.0), np.inf),
         grown,
-        left.sum(axis=0),
         positions.max(axis=0, initial=0.0),
         first_force / loop.step / loop.speed,
-        forces.max(axis=0),
     )
 
 

@@ -38,8 +38,8 @@ def test_stiff_walls_at_1_khz_bounce_on_below_the_speed_of_rest() -> None:
         at(study.Loop(rate=1000.0, seconds=seconds), 3e5, 0.0, study.IMPULSES)
         for seconds in (3.0, 12.0)
     )
-    assert (long.bounces > 3 * short.bounces).all() and not (short.settled | long.settled).any()
-    assert (short.outcomes == study.BOUNCES_ON).all() and np.isinf(short.settles_after).all()
+    for one in (short, long):
+        assert (one.outcomes == study.BOUNCES_ON).all() and np.isinf(one.settles_after).all()
 
 
 def test_a_plastic_impulse_stops_the_mass_on_touching() -> None:
