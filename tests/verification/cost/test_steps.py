@@ -11,7 +11,7 @@ from reference.mujoco import joint_places, set_state
 from verification.check import Study
 from verification.clock import Times
 from verification.cost import growth, impact_times, steps
-from verification.cost.accuracy import BUDGET_ROWS, COMPILED, IAPB, LEMKE, PYTHON, Stopped
+from verification.cost.accuracy import BUDGET_ROWS, COMPILED, IAPB, LEMKE, PYTHON
 from verification.cost.calls import PRINTED, Call
 from verification.cost.resting import RESTING
 from verification.cost.steps import OwnLoop
@@ -64,9 +64,8 @@ def test_pairs_tested_grow_linearly_where_all_pairs_grow_quadratically() -> None
 
 
 def test_every_budget_is_passive_and_the_whole_one_meets_restitution() -> None:
-    rows = BUDGET_ROWS.table(
-        Study(), [Stopped(12, 60, budget) for budget in (0, 3, 7, 8)]
-    ).records()
+    cases = [(12, 60, budget) for budget in (0, 3, 7, 8)]
+    rows = BUDGET_ROWS.table(Study(), cases).records()
     assert max(row["largest relative gain"] for row in rows) <= 0.0
     assert [row["largest residual"] < 1e-13 for row in rows] == [
         row["budget"] == row["rank"] for row in rows
