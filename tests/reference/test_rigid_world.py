@@ -368,5 +368,5 @@ def test_the_record_of_a_rigid_world_has_the_places_of_its_impulses(world: str) 
 
 def test_velocity_bounds_take_each_contact_s_own_share_of_an_overlap() -> None:
     gap = np.array([-1e-3, -1e-3])
-    found = velocity_bounds(gap, np.zeros(2), 0.0, DT, stabilization=np.array([1.0, 0.5]))
+    found = velocity_bounds(gap, np.zeros(2), 0.0, DT, removed=np.array([1.0, 0.5]))
     assert found == pytest.approx([1e-3 / DT, 0.5e-3 / DT])
