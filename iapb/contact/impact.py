@@ -73,7 +73,7 @@ class Impact(NamedTuple):
         inactive.
     status : ``"complete"``; ``"budget"``: the row budget stopped the method early;
         ``"not solved"``: a contact still closes after Poisson's law by more than 1e-6 of the
-        largest |J v⁻|, which nearly opposed rows and κ(M) from 1e10 can cause (the energy does not
+        largest |J v⁻|, which nearly opposed rows and κ(M) from 1e15 can cause (the energy does not
         rise in this case either); ``"reduced"``: no p_t that obeys Coulomb's law was found (there may be
         none). p_t then maximizes the dissipation within the friction limits of the frictionless
         impact. It stays in the friction cones, and passivity and restitution still hold.
@@ -422,11 +422,12 @@ def diagnose(M: Floats, J: Floats, v: Floats, out: Any, refused: int, many: bool
     if not M[k, k] > 0.0:
         return ArgumentError(named(names[0], k, k), float(M[k, k]), "a positive diagonal entry")
     exponents = -(np.frexp(np.diag(M))[1] // 2)
-    with np.errstate(over="ignore"):
+    with np.errstate(over="ignore", invalid="ignore"):
         scaled = np.ldexp(M, exponents[:, None] + exponents)
+        skew = np.abs(scaled - scaled.T)
     for wrong, limit, expected in (
         (np.abs(scaled), LARGEST_ENTRY, "a positive definite matrix"),
-        (np.abs(scaled - scaled.T), SYMMETRY_TOLERANCE, "a symmetric matrix"),
+        (skew, SYMMETRY_TOLERANCE, "a symmetric matrix"),
     ):
         i, j = np.unravel_index(np.argmax(wrong), M.shape)
         if not wrong[i, j] <= limit:

@@ -25,8 +25,8 @@ _CLOSING = 2e-15
 _TOUCHING = 1e-12
 # A unit row that others determine up to this share is dependent on them.
 _DEPENDENT = 1e-13
-# Pushing rows still move by their impulses' rounding. Above this share of |b| it is removed.
-_STILL = 1e-13
+# An entry of the least impulses below this share of their length is rounding.
+_NO_IMPULSE = 1e-13
 
 
 class PushWork(NamedTuple):
@@ -83,10 +83,9 @@ def push_only(rows, count, b, p, residual, work):
                     entering = i
                     speed = closing
         if entering < 0:
-            for j in range(size):
+            for j in range(size):  # pushing rows still move by the rounding of their impulses
                 moving = dot_of(work.q[j], residual)
-                if abs(moving) > _STILL * math.sqrt(dot_of(b, b)):
-                    add_multiple(residual, -moving, work.q[j])
+                add_multiple(residual, -moving, work.q[j])
             return True
         if size < d:
             work.passive[size] = entering
@@ -229,7 +228,7 @@ def share_compression(d, count, restitution, tolerance, compressed, impulses, wo
             tall[k, i] = 1.0 if k == i else 0.0
             for j in range(rank):
                 tall[k, i] -= work.columns[j, k] * work.columns[j, i]
-        tall[count, i] = shared[i] / norm if abs(shared[i]) > _STILL * norm else 0.0
+        tall[count, i] = shared[i] / norm if abs(shared[i]) > _NO_IMPULSE * norm else 0.0
     aim[:count] = 0.0
     aim[count] = 1.0
     found = push_only(tall, count, aim, share.slack, residual, share.push)
@@ -262,11 +261,19 @@ def poisson_impact(d, count, restitution, tolerance, clamped, work, push, share,
     share_compression(d, count, restitution, tolerance, compressed, impulses, work, push, share)
     for k in range(d):  # as before, for what follows
         copy_into(work.columns[k, :count], rows[k])
+    lowest = 1.0
     for i in range(count):
-        returned = restitution[i] * impulses[i]
-        for k in range(d):
+        if impulses[i] > 0.0:
+            lowest = min(lowest, restitution[i])
+    for k in range(
+        d
+    ):  # Aᵀp_c without the rounding of p_c, which is large where rows are nearly opposed
+        compressed[k] += lowest * (compressed[k] - u[k])
+    for i in range(count):
+        returned = (restitution[i] - lowest) * impulses[i]
+        for k in range(d if returned > 0.0 else 0):
             compressed[k] += rows[k, i] * returned
-        impulses[i] += returned
+        impulses[i] += restitution[i] * impulses[i]
     solved = push_only(rows, count, compressed, push.more, final, push)
     push.earlier[:d] = 0.0
     if not solved:

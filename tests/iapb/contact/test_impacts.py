@@ -61,7 +61,7 @@ def ill_conditioned(kappa: float, count: int) -> list[Arrays]:
     return found
 
 
-@pytest.mark.parametrize("kappa", [1e8, 1e14])
+@pytest.mark.parametrize("kappa", [1e8, 1e16])
 def test_poissons_law_is_complete_only_if_no_contact_closes(kappa: float) -> None:
     found = []
     for M, J, v in ill_conditioned(kappa, 1000):
@@ -70,7 +70,7 @@ def test_poissons_law_is_complete_only_if_no_contact_closes(kappa: float) -> Non
     assert ("complete", False) not in found and ("complete", True) in found
     assert (
         kappa < 1e10 or ("not solved", False) in found
-    )  # some 12 of 1000, whatever rounds the draws
+    )  # some 11 of 1000, whatever rounds the draws
 
 
 @pytest.mark.parametrize("seed", range(30))
