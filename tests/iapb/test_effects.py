@@ -43,7 +43,6 @@ def test_a_scene_alone_switches_the_effect_and_the_reason_has_its_values(name: s
 RIGID = RigidConstraints()
 RUBBING = ImpulseAugmented(friction_in_impacts=True)
 ROUGH = PEG.with_values({"contact.friction": 0.3})
-HALF_SMOOTH = ROUGH.with_values({f"walls.{PEG.walls[0].name}.friction": 0.0})
 BARE = PEG.with_values({"couplings": {}})
 LIMITED = PEG.with_values({"device.force_limit": [1, 1, 1]})
 SPREAD = ImpulseAugmented(rendering="spread")

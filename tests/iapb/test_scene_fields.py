@@ -13,7 +13,6 @@ from iapb.advice.checks import check_scene
 from iapb.contact.laws import INTEGRATORS, ImpulseAugmented, Penalty
 from iapb.errors import IapbError
 from iapb.numerics.elementary import sine_cosine
-from iapb.run import Run
 from iapb.scene import Scene, find_scene, load_scene, scene_from_text
 from iapb.scene.expressions import function_of
 from iapb.simulation import Simulation, simulate
@@ -177,31 +176,14 @@ contact: {stiffness: 2e4, damping: 50, friction: 0.4}
 """)
 
 
-def beyond(run: Run) -> float:
-    """Farthest that any coordinate goes past its limits [rad, m]."""
-    low, high = np.array([body.joint_limits for body in CRANE.bodies]).T
-    return float(np.maximum(low - run.q, run.q - high).max())
-
-
-@pytest.mark.parametrize(
-    "law",
-    [
-        ImpulseAugmented(),
-        Penalty(),
-    ],
-)
-def test_limits_hold_in_space_for_turning_and_sliding_joints(law: Any) -> None:
+@pytest.mark.parametrize(("law", "late"), [(ImpulseAugmented(), 0.02), (Penalty(), 0.05)])
+def test_limits_hold_in_space_for_turning_and_sliding_joints(law: Any, late: float) -> None:
+    """Springs alone stop late."""
     run = simulate(CRANE, law)
-    assert 0.0 < beyond(run) < (0.02 if law.impulses else 0.05)  # springs alone stop late
-    assert (
-        not run.distrust and not run.contacts.friction_force.any()
-    )  # a stop has none, whatever contact.friction says
-    assert (np.diff(run.energy["impact_loss"]) >= 0.0).all()
+    low, high = np.array([body.joint_limits for body in CRANE.bodies]).T
+    beyond = np.maximum(low - run.q, run.q - high)
+    assert 0.0 < beyond.max() < late and (beyond > -0.05).any(axis=0).all()
+    # a stop has no friction, whatever contact.friction says
+    assert not run.distrust and not run.contacts.friction_force.any()
     alone = simulate(CRANE.with_values({"contact.self_collision_rows": "per_body"}), law)
     assert np.array_equal(run.q, alone.q)  # rows of one body alone are not used at stops
-    free = simulate(
-        CRANE.with_values(
-            {f"bodies.{name}.joint_limits": None for name in ("mast", "boom", "slider")}
-        )
-    )
-    assert beyond(free) > 0.5

@@ -2,7 +2,6 @@
 answer and its files."""
 
 import json
-import os
 import re
 import shlex
 from contextlib import contextmanager
@@ -361,20 +360,6 @@ def test_tables_and_sentences_fit_a_terminal_and_json_is_strict():
     facts = {"a": np.array([1.0, np.nan]), 2: Part("s", REPRODUCED), "d": (np.int64(3), None)}
     found = json.loads(show.Answer(facts, []).text(json_=True), parse_constant=pytest.fail)
     assert (found["a"], found["2"]["verdict"], found["d"]) == ([1.0, None], REPRODUCED, [3, None])
-
-
-@pytest.mark.parametrize("term", ["xterm", "dumb"])
-def test_on_a_terminal_there_are_bars_unless_it_is_a_dumb_one(monkeypatch, capsys, term):
-    monkeypatch.setitem(os.environ, "FORCE_COLOR", "1")
-    monkeypatch.setitem(os.environ, "TERM", term)
-    with show.stage_progress() as tell:
-        tell("a stage [of work]", 1, 3)
-        print("a result")
-    out, err = capsys.readouterr()
-    assert out == "a result\n" and "a stage [of work]" in err
-    assert ("\x1b[" in err) == (term == "xterm") and ("a stage [of work] ..." in err) == (
-        term == "dumb"
-    )
 
 
 def test_options_of_verify_name_the_commands_that_they_mean():

@@ -33,7 +33,6 @@ from reports.store.io import sealed
 from tests.reports.made_up import flipped
 from verification.claims import arm
 from verification.finding import NOT_COMPUTED, VERDICTS, Finding, Part, failure_of, finding_of
-from verification.proofs import all_proofs
 from verification.table import Column, Table
 
 ANY = (
@@ -227,24 +226,6 @@ def test_a_stage_with_failures_is_computed_again_and_its_traceback_is_kept_until
         and not list(tmp_path.rglob("*incomplete*"))
         and not list(tmp_path.rglob("*failed*"))
     )
-
-
-def test_a_stage_computed_in_a_process_is_that_of_this_process(tmp_path, monkeypatch):
-    name = "proofs"
-    said = []
-    plan = topics.plans()[name]
-    monkeypatch.setattr(gather, "plans", lambda: {name: plan})
-    monkeypatch.setattr(gather, "_figure_runs", os.path.exists)  # which simulates nothing
-    monkeypatch.setattr(gather, "REPORT_WORKERS", 1)
-    made = {name: Stage(tmp_path / "tables", name, plan.kind, "quick")}
-    gather._compute_beside(made, tmp_path, "quick", lambda *given: said.append(given))
-    read = Stage(tmp_path / "tables", name, plan.kind, "quick").fill(
-        Runner(tmp_path / "runs"), pytest.fail
-    )
-    assert made[name].records == read.records and {record.name for record in read.records} == set(
-        all_proofs()
-    )
-    assert said[0] == (gather.BESIDE, 0, 2) and said[-1] == (gather.BESIDE, 2, 2)
 
 
 def test_a_topic_that_fails_is_named_and_ctrl_c_is_no_failure(tmp_path, monkeypatch):

@@ -104,7 +104,9 @@ def test_a_damaged_or_impossible_point_costs_its_own_row(done, tmp_path, capsys)
     assert "contact.restitution" in row.error.item(0)
 
 
-@pytest.mark.parametrize("kill", [signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize(
+    "kill", [signal.SIGINT, pytest.param(signal.SIGKILL, marks=pytest.mark.thorough)]
+)
 def test_a_killed_sweep_keeps_its_finished_points_and_continues(done, tmp_path, kill):
     (tmp_path / "small.yaml").write_text(STUDY)
     command = [sys.executable, "-m", "iapb", "sweep", "small.yaml", "--workers", "1", "--out", "."]
@@ -121,6 +123,7 @@ def test_a_killed_sweep_keeps_its_finished_points_and_continues(done, tmp_path, 
     assert kept.items() <= runs(tmp_path).items() and table(tmp_path).equals(table(done))
 
 
+@pytest.mark.thorough
 def test_two_processes_and_a_cluster_give_the_same_table(done, tmp_path):
     (tmp_path / "small.yaml").write_text(STUDY)
     assert sweep(tmp_path, "--workers", "2") == 0 and table(tmp_path).equals(table(done))

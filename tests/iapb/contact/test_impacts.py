@@ -274,27 +274,6 @@ def test_unequal_restitution_is_poissons_law(seed: int, d: int, c: int) -> None:
         assert found.rank == np.count_nonzero(p > 1e-9 * p.max(initial=0.0))
 
 
-def test_many_contacts_that_all_face_the_motion_are_settled() -> None:
-    """Forty normals about one direction, struck along it: several rows stop pushing at once, the
-    nearest goes first."""
-    for seed in (25, 90, 101, 103, 109, 110, 133):
-        rng = np.random.default_rng(seed)
-        rows = rng.normal(size=(40, 10)) + rng.normal(size=10)
-        rows /= np.linalg.norm(rows, axis=1)[:, None]
-        v = -0.3 * rows.sum(axis=0) + rng.normal(size=10)
-        found = resolve_impact(np.eye(10), rows, v, 0.0, method="poisson")
-        speeds = rows @ found.velocity
-        size = np.linalg.norm(v)
-        assert found.impulses.min() >= 0.0 and speeds.min() >= -1e-11 * size
-        assert np.abs(found.impulses * speeds).max() <= 1e-10 * size * (1.0 + found.impulses.max())
-
-
-@pytest.mark.parametrize("e", [[0.0, 1.0], [1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 1.0, 1.0]])
-def test_equal_rows_of_unequal_restitution_share_the_impact(e: list[float]) -> None:
-    found = resolve_impact([[1.0]], [[1.0 + k] for k in range(len(e))], [-1.0], e)
-    assert found.velocity[0] == pytest.approx(0.5, abs=1e-15) and found.status == "complete"
-
-
 def test_a_contact_that_just_touches_after_compression_shares_the_impact() -> None:
     """It is the last row; the first two are opposed. v⁺ from rationals."""
     rows = [[-2.0, 1.0], [2.0, -1.0], [1.0, -1.0], [0.0, -1.0]]

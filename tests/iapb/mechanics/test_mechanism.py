@@ -42,17 +42,11 @@ def test_results_belong_to_the_caller():
 def test_names_units_and_layout():
     ball = Body("ball", None, Joint("free_flyer"), mass=1.0, inertia=np.eye(3))
     wheel = Body("wheel", "ball", Joint("continuous", (0, 0, 2)), mass=1.0, inertia=np.eye(3))
-    ground = Body("ground", None, Joint("fixed"))
-    mechanism = Mechanism([ball, wheel, ground])
-    assert (mechanism.nq, mechanism.nv) == (9, 7)
-    assert mechanism.coordinate_names[:3] == ("ball.x", "ball.y", "ball.z")
-    assert mechanism.coordinate_names[-2:] == ("wheel.cos", "wheel.sin")
+    mechanism = Mechanism([ball, wheel, Body("ground", None, Joint("fixed"))])
+    assert mechanism.coordinate_names[::4] == ("ball.x", "ball.qy", "wheel.sin")
     assert mechanism.coordinate_units == ("m",) * 3 + ("1",) * 6
     assert mechanism.velocity_units == ("m/s",) * 3 + ("rad/s",) * 4
-    assert mechanism.velocity_names == (
-        *(f"ball.{turn}" for turn in ("x", "y", "z", "rx", "ry", "rz")),
-        "wheel.angle",
-    )
+    assert mechanism.velocity_names[2:5] == ("ball.z", "ball.rx", "ball.ry")
     assert mechanism.tree_dofs == [(0, 7), (7, 7)] and list(mechanism.tree_of_body) == [0, 0, 1]
     np.testing.assert_array_equal(mechanism.neutral(), [0, 0, 0, 0, 0, 0, 1, 1, 0])
 
@@ -61,7 +55,6 @@ def test_names_units_and_layout():
     ("call", "named"),
     [
         (lambda: Joint("hinge"), "kind"),
-        (lambda: Body("b", None, Joint("fixed"), mass=-1.0), "mass"),
         (
             lambda: Body("b", None, Joint("fixed"), (np.diag([1, 1, -1]), np.zeros(3))),
             "placement rotation",
@@ -69,7 +62,6 @@ def test_names_units_and_layout():
         (lambda: Body("b", None, Joint("fixed"), inertia=np.triu(np.ones((3, 3)))), "inertia"),
         (lambda: Mechanism([rod("a", None, 0.0), rod("a", None, 0.0)]), "name"),
         (lambda: Mechanism([rod("a", None, 0), rod("b", None, 0), rod("c", "a", 0)]), "bodies"),
-        (lambda: two_link_arm().mass_matrix([0.0]), "q"),
         (lambda: two_link_arm().bias([0.0, 0.0], [0.0, np.inf]), "v"),
         (lambda: two_link_arm().biases([[0.0, 0.0]] * 2, [[0.0, 0.0], [0.0, np.inf]]), r"vs\[1\]"),
         (lambda: two_link_arm().rows_along([[0.0, 0.0]], [9], [[0, 0, 0]], [[1, 0, 0]]), "bodies"),

@@ -199,23 +199,10 @@ def test_a_start_follows_the_leader_and_stays_within_both_ranges(load: Load) -> 
 
 def test_one_remark_counts_what_has_no_effect(load: Load) -> None:
     shapes = "<visual><geometry><box/></geometry></visual><collision/><collision/>"
-    scene = load(
-        PALM,
-        link("finger", inside=shapes),
-        SLIDE.replace('<axis xyz="0 0 1"/>', '<axis xyz="0 0 1" rpy="0 0 0"/>'),
-        '<transmission name="t"/><gazebo/><gazebo reference="palm"/>',
-    )
+    slide = SLIDE.replace('<axis xyz="0 0 1"/>', '<axis xyz="0 0 1" rpy="0 0 0"/>')
+    scene = load(PALM, link("finger", inside=shapes), slide, "<gazebo/><gazebo reference='palm'/>")
     (said,) = scene.remarks
-    for what in (
-        "effort of <limit> (1)",
-        "velocity of <limit> (1)",
-        "<visual> (1)",
-        "<collision> (2)",
-        "rpy of <axis> (1)",
-        "<transmission> (1)",
-        "<gazebo> (2)",
-        "the scene gives shapes",
-    ):
+    for what in ("effort of <limit> (1)", "<collision> (2)", "rpy of <axis> (1)", "<gazebo> (2)"):
         assert said.count(what) == 1
     assert simulate(scene, steps=1).remarks[0] == said
     assert scene.with_values({"rate": 500}).remarks == scene.remarks
@@ -256,8 +243,6 @@ def test_damping_and_friction_of_planar_and_floating_joints_are_refused(
 @pytest.mark.parametrize(
     "bodies",
     [
-        "hand: {body: r_finger}",
-        "bodies: [{name: stand, joint: fixed}]",
         "bodies: [{name: tool, parent: r_finger, joint: fixed}]",
         "hand: {body: r_finger}\ndevice: {force_limit: [1]}\n"
         "couplings: {unilateral: {stiffness: [1], damping: [1]}}",
@@ -344,13 +329,10 @@ def test_a_joint_that_moves_no_mass_is_named(said: str, bodies: list[str]) -> No
 def test_a_planar_joint_moves_across_its_axis(load: Load, axis: str) -> None:
     slide = joint("move", "finger", "planar").replace('"0 0 1"', f'"{axis}"')
     scene = load(PALM, FINGER, slide, more="position: {finger: [0.3, 0.2, 0.5]}")
-    mechanism = mechanism_of(scene)
     normal = np.array(axis.split(), float)
-    R, p = mechanism.placements(start_of(scene)[0])
+    R, p = mechanism_of(scene).placements(start_of(scene)[0])
     moved = p[-1] - [0.1, 0.0, 0.0]
     assert np.linalg.norm(moved) == pytest.approx(np.hypot(0.3, 0.2))
     assert moved @ normal == pytest.approx(0.0, abs=1e-15)
     np.testing.assert_allclose(R[-1] @ normal, normal, atol=1e-14)
     assert np.trace(R[-1]) == pytest.approx(1.0 + 2.0 * np.cos(0.5))
-    R, p = mechanism.placements(mechanism.neutral())
-    np.testing.assert_allclose(R[-1], np.eye(3), atol=1e-15)

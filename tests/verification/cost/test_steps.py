@@ -6,8 +6,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from iapb.system import System
-from reference.mujoco import joint_places, set_state
 from verification.check import Study
 from verification.clock import Times
 from verification.cost import growth, impact_times, steps
@@ -15,20 +13,6 @@ from verification.cost.accuracy import BUDGET_ROWS, COMPILED, IAPB, LEMKE, PYTHO
 from verification.cost.calls import PRINTED, Call
 from verification.cost.resting import RESTING
 from verification.cost.steps import OwnLoop
-
-
-@pytest.mark.parametrize("name", RESTING)
-def test_masses_are_the_same(name: str) -> None:
-    mujoco = pytest.importorskip("mujoco")
-    theirs = steps.TheirLoop(RESTING[name], "Newton", 1)
-    system = System(theirs.scene)
-    data = mujoco.MjData(theirs.model)
-    set_state(joint_places(theirs.scene, theirs.model), data, *system.start)
-    mujoco.mj_forward(theirs.model, data)
-    mass = np.zeros((theirs.model.nv, theirs.model.nv))
-    mujoco.mj_fullM(theirs.model, data, mass)
-    np.testing.assert_allclose(mass, system.make_state().mass_matrix, rtol=1e-9, atol=1e-12)
-    assert theirs.model.opt.timestep == system.dt
 
 
 @pytest.mark.parametrize("name", ["peg in the corner", "free box on a plane"])

@@ -33,8 +33,6 @@ DROPPED = ""  # the whole hypothesis
 CORRUPTED = [
     ("theorem_1", "v⁺ = v − (1 + e)", "v⁺ = v + (1 + e)"),
     ("theorem_2", "given   M is positive definite", DROPPED),
-    ("newton_law_solvable", "G b + (I − G W) p", "G b + (I + G W) p"),
-    ("step_37", "X W X = X\n", "X W X = 2 X\n"),
     ("single_contact_complementarity", "lemma   −s² ≥ 0", "lemma   s² ≥ 0"),
     ("resting_contact", ":: k = K h + B", ":: k = K h − B"),
     ("spectral_filter", "sᵀ (I − E²) s ≥ 0", "sᵀ (E² − I) s ≥ 0"),
