@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from iapb import errors
-from iapb.names import nearest, one_of
+from iapb.names import nearest
 
 ERRORS = [
     errors.ArgumentError("mass", -1.0, "at least 0 kg"),
@@ -57,13 +57,3 @@ SCENES = ("peg_corner", "peg_hole", "two_discs")
 )
 def test_the_nearest_name_is_found_whatever_its_capitals(wrong, right):
     assert nearest(wrong, SCENES) == right and nearest("iapb", ["ideal", "IAPB", "PB"]) == "IAPB"
-
-
-def test_all_names_are_listed_and_the_guess_comes_last():
-    assert (
-        one_of("peg_cornr", SCENES)
-        == "one of peg_corner, peg_hole, two_discs; did you mean peg_corner?"
-    )
-    assert (
-        one_of("submarine", SCENES, "a file, or: ") == "a file, or: peg_corner, peg_hole, two_discs"
-    )

@@ -46,7 +46,6 @@ HAND = [
     (1e-4, 0.0, {}, -1e-4 / DT),  # an open plastic contact closes exactly and does not pass
     (1e-9, 0.5, {}, -1.0),  # an open elastic contact is left alone
     (0.0, 0.0, {}, 0.0),
-    (0.0, 0.3, {}, 0.3),
     (0.0, 1.0, {}, 1.0),  # a closed contact obeys Newton
     (0.0, 0.5, {"together": True}, 0.5),
 ]

@@ -360,9 +360,3 @@ def test_tables_and_sentences_fit_a_terminal_and_json_is_strict():
     facts = {"a": np.array([1.0, np.nan]), 2: Part("s", REPRODUCED), "d": (np.int64(3), None)}
     found = json.loads(show.Answer(facts, []).text(json_=True), parse_constant=pytest.fail)
     assert (found["a"], found["2"]["verdict"], found["d"]) == ([1.0, None], REPRODUCED, [3, None])
-
-
-def test_options_of_verify_name_the_commands_that_they_mean():
-    assert cli._named(["verify", "--full", "--seed", "3"]) == ["verify-many", "--seed", "3"]
-    assert cli._named(["verify", "--world", "mujoco"]) == ["verify-world", "mujoco"]
-    assert cli._named(["run", "--world", "IAPB"]) == ["run", "--world", "IAPB"]

@@ -32,7 +32,6 @@ from verification.cost.trajectories import BELOW, OK, TIMED_OUT, WORLDS
 from verification.stability.port import COUPLINGS
 from verification.table import titled
 
-MOST_SERIES = 6
 SCENES = tuple(f"scene {k}" for k in range(6))
 CHECKS = {
     "complementarity": [TWO_CONTACTS, LANDINGS],
@@ -217,18 +216,6 @@ def test_a_world_keeps_its_colour_and_marker_in_every_figure(gallery):
             assert line.get_color() == STYLES[name].color, name
             assert line.get_marker() in (STYLES[name].marker, "", "None"), name
     assert seen >= {"ideal", "IAPB", "PB", "CBuc", "psaturated"}
-
-
-def test_a_plot_has_at_most_six_series_each_named_in_the_legend_in_a_style_of_its_own(figure):
-    shown = [look for _, look in figure.legend if look.name]
-    styles = {(look.marker, look.dash, look.filled, look.width > 0) for look in shown}
-    assert len(styles) == len(shown)  # even without their colour
-    for panel in figure.panels:
-        names = set(re.findall(r'data-curve="([^"]+)"', panel.svg))
-        assert len(names) <= MOST_SERIES
-        named = {text for text, _ in figure.legend} | {look.name for _, look in figure.legend}
-        named |= {name for name in names if f">{name}</text>" in panel.svg}  # a legend of its own
-        assert len(names) == 1 or names <= named, panel.label
 
 
 def test_a_drawing_is_whole_asks_for_nothing_and_takes_the_colours_of_the_page(figure):

@@ -218,11 +218,10 @@ def test_a_figure_names_its_runs_and_the_command_that_draws_it_and_a_long_table_
     panel = Panel(grid(("a",), {"row": [cell("x")]}), 'says "x"')
     drawn = Figure("fig07", "", "A table", "Look.", (panel,), None, (), ("C10", "a table"))
     page = build_report(Evidence(runs=RUNS), [drawn])["report/figures.html"]
-    assert '<table aria-label="says &#34;x&#34;" class="grid' in page and "&lt;table" not in page
+    assert "says &#34;x&#34;" in page and "&lt;table" not in page
     assert "Data: C10, a table. To compute it again: <code>iapb reproduce --fig" in page
     rows = tuple((float(n),) for n in range(ROWS_SHOWN + 1))
     page = joined(Evidence(topics=(one("stability", tables={"trees": titled(("x",), rows)}),)))
-    assert f"The first {ROWS_SHOWN} of {ROWS_SHOWN + 1} lines" in page
     assert page.count('<tr><th scope="row" class="n">') == ROWS_SHOWN
 
 

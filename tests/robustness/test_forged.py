@@ -26,7 +26,7 @@ from iapb.mechanics.urdf import read_urdf
 from reference.datasets import read_problem
 from reports.cli import Harmless, harmless, main
 from reports.store import read_run, write_run
-from reports.store.io import sealed, write_whole
+from reports.store.io import sealed
 from tests.robustness.samples import fclib_files, sample_run
 
 pytestmark = pytest.mark.thorough
@@ -281,29 +281,6 @@ def test_streams_that_end_or_are_full_blame_no_file(line, status, said, tmp_path
         and "Traceback" not in done.stderr
     ), done
     assert done.stderr == said or (said == "0" and int(done.stderr) > 1000), done
-
-
-def limited(act, *words):
-    """Do something where no file may have more than 50 bytes."""
-    resource.setrlimit(resource.RLIMIT_FSIZE, (50, 50))
-    return act(*words)
-
-
-def test_what_cannot_be_written_is_named_and_leaves_nothing_behind(tmp_path):
-    run = write_run(tmp_path / "run.h5", sample_run())
-    place = tmp_path / "new" / "file"
-    os.mkfifo(tmp_path / "pipe")
-    with pytest.raises(RunFileError, match="pipe: cannot be written: .* in its place"):
-        write_whole(tmp_path / "pipe", "text")
-    assert command("certify", run, "--export", tmp_path / "enough") == 0
-    for act, words in (
-        (command, ("certify", run, "--export", place)),
-        (write_whole, (place, "text" * 50)),
-        (write_run, (place, sample_run())),
-    ):
-        said = refused(act, *words, act=limited)
-        assert f"{place.parent}/" in said and "cannot be written: File too large" in said, said
-        assert list(place.parent.iterdir()) == []
 
 
 def test_no_text_or_name_of_a_file_gives_the_terminal_orders(tmp_path, capsys):

@@ -14,9 +14,6 @@ from verification.cost.trajectories import (
     BELOW,
     MOTIONS,
     WORTH,
-    falling,
-    runs_of,
-    tenfold_cost,
     worth,
 )
 from verification.finding import REFUTED, REPRODUCED
@@ -176,23 +173,3 @@ def test_a_missed_target_is_refuted(tables: Tables, key: str, planted: Table, mi
     assert [part.verdict for part in found.parts].count(REFUTED) == misses
     values = read_values(found.tables)
     assert values["targets_met"] == values["targets"] - misses == len(found.parts) - misses
-
-
-@pytest.mark.parametrize(
-    ("errors", "used", "cost"),
-    [
-        ((1e-1, 1e-2, 1e-3), (1e-1, 1e-2, 1e-3), 100.0),
-        ((1e-1, 1e-2, 1e-3, 0.9e-3, 1.1e-3), (1e-1, 1e-2, 1e-3), 100.0),
-        ((0.9, 1.0, 1e-1, 1e-2), (1.0, 1e-1, 1e-2), 100.0),  # the coarse end does not count
-        ((1e-1, 1e-2, 1e-3, 1e-10), (1e-1, 1e-2, 1e-3), 100.0),  # exact by chance
-        # no fit to two runs, nor to three whose errors span less than the tenfold
-        ((1e-1, 1e-2, 0.9e-2), (1e-1, 1e-2), None),
-        ((8e-1, 4e-1, 1e-1), (8e-1, 4e-1, 1e-1), None),
-    ],
-)
-def test_a_fit_takes_the_runs_on_which_the_error_falls(
-    errors: tuple[float, ...], used: tuple[float, ...], cost: float | None
-) -> None:
-    kept = falling(runs_of(_motions(good=errors)))
-    assert tuple(run["position"] for run in kept) == used
-    assert tenfold_cost(kept) == (cost and pytest.approx(cost))

@@ -257,17 +257,6 @@ PASSAGES: dict[str, tuple[list[Any], list[Any], str]] = {
         plate(0.2, 0.2, 0.01),
         "a passes through plate",
     ),
-    "polygon, polygon": (
-        [body("a", {"kind": "polygon", "vertices": [[0, 0], [0.01, 0], [0, 0.01]]}, UP, DOWN)],
-        [
-            {
-                "name": "plate",
-                "kind": "polygon",
-                "vertices": [[-0.1, -0.005], [0.1, -0.005], [0, 0.005]],
-            }
-        ],
-        "a passes through plate",
-    ),
     "disc, moving plate": (
         [
             body("a", DISC, UP, [0, -21.0]),

@@ -27,22 +27,6 @@ def test_every_scene_loads_under_its_file_name_and_starts_without_deep_overlap(n
     assert np.linalg.eigvalsh(mechanism_of(scene).mass_matrix(q)).min() > 0.0
 
 
-@pytest.mark.parametrize("depth", [1e-6, 1e-5, 7e-5])
-def test_peg_meets_the_tight_hole_at_six_points_in_the_same_instant(depth: float) -> None:
-    """Six contacts approach at once wherever in the step the peg arrives; their rows have rank
-    3."""
-    scene = load_scene(find_scene("peg_hole"))
-    mechanism = mechanism_of(scene)
-    seated = np.array([0.0, 0.0105, 0.0])
-    assert not contacts_at(scene, seated + [0.0, 1e-9, 0.0])
-    q = seated - [0.0, depth, 0.0]
-    inward = np.array([0.0, -0.04, 0.0])
-    found = contacts_at(scene, q)
-    rows = np.array([normal @ mechanism.point_jacobian(q, 0, point) for point, normal, _ in found])
-    assert rows.shape == (6, 3) and (rows @ inward < -10.0 * scene.contact.approach_velocity).all()
-    assert np.linalg.matrix_rank(rows, tol=1e-4) == 3
-
-
 @pytest.fixture(scope="module")
 def peg() -> Run:
     return simulate(load_scene(find_scene("peg_hole_space")))

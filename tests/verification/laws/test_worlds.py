@@ -11,11 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from iapb.errors import ArgumentError
 from iapb.run import Run
 from iapb.scene import Scene
 from iapb.system import System
-from iapb.worlds import find_world
 from verification.laws.worlds import judge_world
 
 HERE = "tests.verification.laws.test_worlds"
@@ -76,17 +74,3 @@ def test_mujoco_keeps_the_laws() -> None:
     counts, _ = judge_world("mujoco", scenes=8)
     assert {count.law for count in counts} == {"finite", "velocity", "energy", "overlap"}
     assert not any(count.failures for count in counts)
-
-
-@pytest.mark.parametrize(
-    ("name", "said"),
-    [
-        ("no_such:engine", "can be imported"),
-        ("json:dumps", "an engine: an object with name"),
-        (f"{HERE}:Flit", "did you mean Flight"),
-        ("mujocco", "did you mean mujoco"),
-    ],
-)
-def test_a_wrong_name_is_refused(name: str, said: str) -> None:
-    with pytest.raises(ArgumentError, match=said):
-        find_world(name)

@@ -97,8 +97,6 @@ def test_the_extracted_checker_judges_as_the_exact_judge_does(
 IMPACT = f"{EXPORT_HEAD}\n1 1 0 1 0 1 0\n"
 WRAPPED = (
     "0x7fffffffffffffff",
-    "0b1",
-    "1_0",
     "1\r",
     "4611686018427387904",
 )
