@@ -303,8 +303,9 @@ def _spun(seen: _Seen) -> Iterator[str]:
     """Say which free body that carries nothing changes its spin or speed, gravity apart, while no
     force acts on it."""
     run = seen.run
-    forces = [run.impulse, *(getattr(run, f"{name}_force") for name in FORCES)]
-    pushed = np.any(forces, axis=0)
+    pushed = run.impulse != 0.0
+    for name in FORCES:
+        pushed |= getattr(run, f"{name}_force") != 0.0
     trees = seen.mechanism.tree_of_body.tolist()
     for b, body in enumerate(seen.bodies):
         flat = body.joint == "planar"

@@ -114,7 +114,7 @@ def resolve_impact(
     *,
     method: str = "factored",
     budget: int | None = None,
-    clamp: bool | None = None,
+    clamp: bool = True,
     rank_tolerance: float | None = None,
 ) -> Impact:
     """Resolve a simultaneous impact: J v⁺ = −e J v⁻ for every row given, with M(v⁺ − v⁻) in
@@ -139,7 +139,6 @@ def resolve_impact(
     budget : largest number of rows used, the most violated first (``factored`` only). Every budget
         is passive.
     clamp : whether to scale Δv so that rounding cannot raise the energy, in real arithmetic.
-        Default: True.
     rank_tolerance : a row closer than this to the span of the rows used (unit rows, kinetic metric)
         is not used. Default: 1e-10, or 4 d ε κ(L), the rounding of the rows, where this is larger.
 
@@ -187,7 +186,7 @@ def resolve_impacts(
     restitution: ArrayLike,
     *,
     budget: int | None = None,
-    clamp: bool | None = None,
+    clamp: bool = True,
     rank_tolerance: float | None = None,
 ) -> Impact:
     """Resolve n impacts of equal size in one call, bit for bit as `resolve_impact` with
@@ -531,9 +530,9 @@ def _options(
             expected = "None: only 'factored', with one restitution for all, can stop early"
             raise ArgumentError("budget", budget, expected)
         budget = int(budget)
-    if clamp is not None and not isinstance(clamp, bool | np.bool_):
-        raise ArgumentError("clamp", clamp, "True, False or None")
+    if not isinstance(clamp, bool | np.bool_):
+        raise ArgumentError("clamp", clamp, "True or False")
     is_number = isinstance(tolerance, float | int | np.floating)
     if tolerance is not None and not (is_number and 0.0 < tolerance < 1.0):
         raise ArgumentError("rank_tolerance", tolerance, "a number strictly between 0 and 1")
-    return budget, clamp is None or bool(clamp), float(tolerance or 0.0)
+    return budget, bool(clamp), float(tolerance or 0.0)

@@ -19,7 +19,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field, ValidationError
@@ -67,6 +67,12 @@ class Robot(ScenePart):
     )
 
 
+class Robots(ScenePart):
+    """The robots of a scene."""
+
+    robots: Annotated[tuple[Robot, ...], Field(max_length=MAX_ROBOTS)]
+
+
 class Added(NamedTuple):
     """What the robots of a scene add to it."""
 
@@ -85,27 +91,22 @@ def with_robots(document: Document) -> tuple[Any, Added]:
         isinstance(given, dict) and "dimensions" in given and isinstance(given.get("robots"), list)
     ):
         return given, added
-    listed = given.get("bodies", [])
-    robots = given["robots"]
-    if len(robots) > MAX_ROBOTS:
-        place = document.place(("robots",))
-        said = f"{len(robots)} robots", f"at most {MAX_ROBOTS} robots"
-        added.mistakes.append(Mistake(file, *place, "robots", *said))
-        return given, added
     bodies: list[dict[str, Any]] = []
-    for i, item in enumerate(robots):
+    robots: tuple[Robot, ...] = ()
+    try:
+        robots = Robots.model_validate({"robots": given["robots"]}).robots
+    except ValidationError as failure:
+        added.mistakes.extend(mistakes_of(failure, file, given, document.place))
+    for i, robot in enumerate(robots):
         try:
-            robot = Robot.model_validate(item)
             bodies += bodies_of(robot, Path(file).parent, added, i)
-        except ValidationError as failure:
-            added.mistakes.extend(mistakes_of(failure, file, given, document.place, ("robots", i)))
         except ArgumentError as failure:
             field = failure.argument.split(" ")[0]
             place = document.place(("robots", i, field if field in Robot.model_fields else "urdf"))
             where = f"robots[{i}].{failure.argument}"
-            added.mistakes.append(
-                Mistake(file, *place, where, shown(failure.value), failure.expected)
-            )
+            value = shown(failure.value)
+            added.mistakes.append(Mistake(file, *place, where, value, failure.expected))
+    listed = given.get("bodies", [])
     kept = {key: value for key, value in given.items() if key != "robots"}
     if isinstance(listed, list | None):
         kept["bodies"] = [*(listed or ()), *bodies]

@@ -308,7 +308,7 @@ def resolve_once(case: HardCase, method: str) -> Answer:
     elif method in COMPARED:
         velocity = COMPARED[method](*given)
     else:
-        impact = resolve_impact(*given, clamp=None if method == "factored" else False)
+        impact = resolve_impact(*given, clamp=method == "factored")
         velocity = impact.velocity
         rank = impact.rank
     if method in COMPARED and not np.isfinite(velocity).all():

@@ -177,6 +177,12 @@ WARNED: dict[str, tuple[Scene, list[str], list[str], list[dict[str, Any]]]] = {
         ["rate >= 8100 Hz"],
         [{"bodies.box_0.velocity": [0, -10.0, 0]}],
     ),
+    "inertia": (
+        scene(box(height=0.15, inertia=1.0)),
+        ["inertia"],
+        ["6e+02 times"],
+        [{"bodies.box_0.inertia": 0.16}, {"bodies.box_0.shapes.0.size": [1.0, 1.0]}],
+    ),
     "implicit in space": (
         BALL,
         ["integrator"],
