@@ -30,7 +30,7 @@ from iapb.mechanics.mechanism import Mechanism
 from iapb.mechanics.structure import make_free_motion
 from iapb.numerics.compiled import Entry, block
 from iapb.numerics.linalg import cholesky
-from iapb.numerics.schema import blank, quantities, zeros_of
+from iapb.numerics.schema import Floats, blank, quantities, zeros_of
 from iapb.scene import Scene, SpatialScene
 from iapb.scene import mechanism as scene_parts
 
@@ -99,6 +99,14 @@ class System:
     def solids(self) -> dict[int, Solid]:
         """The solid of each shape that is not endless."""
         return solids_of(self.shapes)
+
+    @cached_property
+    def thickness(self) -> Floats:
+        """Smallest extent of each shape [m], infinite for endless ones."""
+        thin = np.full(len(self.shapes.kind), np.inf)
+        for i, solid in self.solids.items():
+            thin[i] = solid.thin
+        return thin
 
     @cached_property
     def finder(self) -> ContactFinder:
@@ -402,9 +410,7 @@ def _sweep_of(system: System) -> Sweep:
     spheres = [bounding_sphere(shapes, i) for i in range(len(shapes.kind))]
     middle = np.array([middle for middle, _ in spheres], np.float64).reshape(-1, 3)
     radius = np.array([radius for _, radius in spheres], np.float64)
-    thin = np.full(len(spheres), np.inf)
-    for i, solid in system.solids.items():
-        thin[i] = solid.thin
+    thin = system.thickness
     reach = (np.linalg.norm(middle, axis=1) + radius)[shapes.body >= 0].max(initial=0.0)
     linked = any(body.parent is not None for body in system.mechanism.bodies)
     lever = np.inf if linked else np.sqrt(3.0) * (1.0 + reach)

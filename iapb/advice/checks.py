@@ -120,12 +120,9 @@ class Start:
     def size(self) -> Floats:
         """Smallest extent of each shape, infinite for walls; of a joint limit the joint's range
         [m]."""
-        extents = np.full(len(self.system.shapes.kind), math.inf)
-        for i, solid in self.system.solids.items():
-            extents[i] = solid.thin
         limits = mechanism.limits_of(self.scene)
         ranges = [float(np.ptp(limits[body] or (0.0,))) for body in self.stops.body.tolist()]
-        return np.concatenate([extents, self.stops.arm * ranges])
+        return np.append(self.system.thickness, self.stops.arm * ranges)
 
     @cached_property
     def kind(self) -> Integers:
@@ -138,7 +135,7 @@ class Start:
         limits."""
         margin = math.inf
         if len(self.system.pairs) > MANY_PAIRS:
-            extents = self.size[: len(self.system.shapes.kind)]
+            extents = self.system.thickness
             margin = float(extents[np.isfinite(extents)].max(initial=0.0))
         placed = self.mechanism.placements(self.q)
         stops = self.stops

@@ -87,9 +87,8 @@ class _Seen:
         self.solids = system.solids  # by shape, without endless walls
         # smallest extent of each body; last, of the world
         self.sizes = np.full(len(self.bodies) + 1, math.inf)
-        for solid in self.solids.values():
-            if solid.body >= 0:
-                self.sizes[solid.body] = min(self.sizes[solid.body], solid.thin)
+        np.minimum.at(self.sizes, system.shapes.body, system.thickness)
+        self.sizes[-1] = math.inf
         # the tree that a unilateral coupler moves without force, at times
         self.carried = system.tool_tree if run.coupling == "unilateral" else -1
 
