@@ -31,7 +31,7 @@ from iapb.errors import counted
 from iapb.names import in_metres
 from iapb.numerics.schema import Floats, Integers
 from iapb.scene import Scene, SpatialScene, mechanism
-from iapb.scene.bodies import WORLD, filled_with, inertia_matrix
+from iapb.scene.bodies import WORLD, filled_with
 from iapb.scene.model import MAX_RATE, Gains, Hand
 from iapb.scene.parts import Path
 from iapb.system import system_of
@@ -120,8 +120,7 @@ class Start:
     def size(self) -> Floats:
         """Smallest extent of each shape, infinite for walls; of a joint limit the joint's range
         [m]."""
-        limits = mechanism.limits_of(self.scene)
-        ranges = [float(np.ptp(limits[body] or (0.0,))) for body in self.stops.body.tolist()]
+        ranges = np.repeat(np.ptp(self.stops.bound.reshape(-1, 2), axis=1), 2)
         return np.append(self.system.thickness, self.stops.arm * ranges)
 
     @cached_property
@@ -327,9 +326,7 @@ class Start:
                 break
             pushing &= force > 0.0  # a contact that would pull carries nothing
         hand = self.scene.hand.largest_force() if self.scene.hand is not None else 0.0
-        weights = float(np.linalg.norm(self.system.gravity)) * sum(
-            body.mass for body in self.scene.bodies
-        )
+        weights = float(np.linalg.norm(self.system.gravity) * self.mechanism.arrays.mass.sum())
         # wedges and levers can give more, but less in other poses
         return np.clip(force, 0.0, weights + hand)
 
@@ -395,7 +392,7 @@ def check_scene(
     chosen = chosen.within(scene) if hasattr(chosen, "within") else chosen
     start = Start(scene)
     uses = frozenset[str](getattr(chosen, "uses", ()))
-    found = [*_degrees(scene), *_inertias(scene), *_overlaps(start)]
+    found = [*_degrees(scene), *_inertias(start), *_overlaps(start)]
     found += _fast(start, laws.IMPULSES in uses and scene.contact.at_touch, coupling != "none")
     if laws.PENALTY in uses and not scene.contact.rigid:
         found += _sags(start)
@@ -462,34 +459,24 @@ def _about(scene: Scene, kind: str, path: Path, says: str) -> Caution:
     return Caution(kind, name, f"{scene.place_of(*path)}{name}{says}")
 
 
-def _inertias(scene: Scene) -> Iterator[Caution]:
+def _inertias(start: Start) -> Iterator[Caution]:
     """Warn of moments of inertia that no body has: the largest one exceeds the sum of the others by
     a thousandth; and of those of a free body that its shapes do not have with its mass."""
-    for i, body in enumerate(scene.bodies):
-        path = ("bodies", i, "inertia")
-        given = np.atleast_2d(body.inertia)
-        if isinstance(scene, SpatialScene):
-            given = inertia_matrix(body.inertia)
-            low, middle, high = np.linalg.eigvalsh(given).tolist()
-            if high > 1.001 * (low + middle):
-                yield _about(
-                    scene,
-                    "inertia",
-                    path,
-                    f": no body has a moment of {high:.3g} kg m2 beside {low:.3g} and "
-                    f"{middle:.3g}; it is at most their sum",
-                )
+    moments = np.linalg.eigvalsh(start.mechanism.arrays.inertia)
+    for i, (body, (low, middle, high)) in enumerate(
+        zip(start.scene.bodies, moments.tolist(), strict=True)
+    ):
+        if high > 1.001 * (low + middle):
+            says = f": no body has a moment of {high:.3g} kg m2 beside {low:.3g} and {middle:.3g}"
+            says += "; it is at most their sum"
+            yield _about(start.scene, "inertia", ("bodies", i, "inertia"), says)
         if body.joint in ("planar", "free_flyer") and body.parent == WORLD and body.shapes:
             filled = filled_with(body.shapes, 1.0)
-            usual = body.mass / filled["mass"] * np.trace(np.atleast_2d(filled["inertia"]))
-            times = float(np.trace(given) / usual)
+            largest = np.linalg.norm(np.atleast_2d(filled["inertia"]), 2)
+            times = float(high / (largest * body.mass / filled["mass"]))
             if not 1.0 / STRANGE < times < STRANGE:
-                yield _about(
-                    scene,
-                    "inertia",
-                    path,
-                    f" is {times:.2g} times that of its shapes with its mass: is the unit kg m2?",
-                )
+                says = f" is {times:.2g} times that of its shapes with its mass: is the unit kg m2?"
+                yield _about(start.scene, "inertia", ("bodies", i, "inertia"), says)
 
 
 def _overlaps(start: Start) -> Iterator[Caution]:
@@ -759,7 +746,7 @@ def _loops(start: Start, coupling: str) -> dict[str, HapticLoop]:
     )
     K, B = contact.gains
     if contact.rigid:  # as `iapb.contact.kernels.implicit` chooses it
-        soft = sum(body.mass for body in scene.bodies) / (COMPLIANCE * start.dt)
+        soft = float(start.mechanism.arrays.mass.sum()) / (COMPLIANCE * start.dt)
         K = soft / ((1.0 + FADING) * start.dt)
         B = soft - K * start.dt
     loops = {"in free motion": free}

@@ -20,8 +20,7 @@ from iapb.mechanics.rotations import rotation_of
 from iapb.names import in_metres
 from iapb.numerics.schema import Booleans, Floats, Integers
 from iapb.run import UNSOLVED, Run
-from iapb.scene.bodies import in_space, inertia_matrix
-from iapb.scene.mechanism import limits_of, shape_names
+from iapb.scene.mechanism import shape_names
 from iapb.scene.reading import scene_from_values
 from iapb.system import System
 
@@ -96,7 +95,7 @@ class _Seen:
         """Negligible energy [J] of some bodies: to lift each by a thousandth of its size; and
         rounding of the scene."""
         rounding = 1e-14 * float(self.run.energy["kinetic"].max())
-        weights = np.linalg.norm(self.system.gravity) * np.array([b.mass for b in self.bodies])
+        weights = np.linalg.norm(self.system.gravity) * self.mechanism.arrays.mass
         sizes = np.where(np.isinf(self.sizes), 0.0, self.sizes)[:-1]
         return rounding + 1e-3 * float((weights * sizes)[bodies].sum())
 
@@ -234,7 +233,7 @@ def _in_overlaps(seen: _Seen, gap: Floats, bodies: Booleans) -> float:
     if seen.scene.contact.stiffness is not None:
         return 0.5 * seen.scene.contact.stiffness * float(np.sum(gap**2))
     depth = -float(gap.min(initial=0.0))
-    mass = sum(body.mass for body, chosen in zip(seen.bodies, bodies, strict=True) if chosen)
+    mass = float(seen.mechanism.arrays.mass[bodies].sum())
     speed = depth / (FADING * seen.run.dt)
     gravity = float(np.linalg.norm(seen.system.gravity))
     return mass * (0.5 * speed**2 + gravity * depth)
@@ -317,13 +316,12 @@ def _spun(seen: _Seen) -> Iterator[str]:
         if flat:
             angular = v * [0.0, 0.0, 1.0]
             linear = v * [1.0, 1.0, 0.0] @ rotation_of((0.0, 0.0, body.angle)).T
-            inertia = np.eye(3)
         else:
             angular = v[:, 3:]
             linear = (turn @ v[:, :3, None])[..., 0]
-            inertia = inertia_matrix(body.inertia)
+        inertia = seen.mechanism.arrays.inertia[b]
         spin = turn @ (angular @ inertia / np.linalg.norm(inertia, 2))[..., None]  # R I w / |I|
-        arm = np.cross(angular, in_space(body.center_of_mass))
+        arm = np.cross(angular, seen.mechanism.arrays.center_of_mass[b])
         speed = turn @ arm[..., None] + linear[..., None]
         falls = seen.system.gravity[:, None] * run.dt
         fastest = np.linalg.norm(linear, axis=1).max()
@@ -517,10 +515,8 @@ def _overran(seen: _Seen) -> Iterator[str]:
     at the end."""
     run = seen.run
     most = OVERRUN[seen.scene.contact.forces]
-    for i, limits in zip(seen.mechanism.arrays.q_start, limits_of(seen.scene), strict=True):
-        if limits is None:
-            continue
-        low, high = limits
+    stops = seen.system.stops
+    for i, (low, high) in zip(stops.coordinate[::2], stops.bound.reshape(-1, 2), strict=True):
         beyond = np.maximum(low - run.q[:, i], run.q[:, i] - high) / (high - low)
         k = -1 if beyond[-1] > most else int(beyond.argmax())
         if k == -1 or beyond[k] > DEEP:

@@ -277,8 +277,8 @@ def _overlapping_at_start(
 
 def tree_masses(scene: Scene, mechanism: Mechanism) -> Floats:
     """Return the mass [kg] of each tree; of one without mass, its largest moment of inertia."""
-    masses = np.array([body.mass for body in scene.bodies])
-    found = np.bincount(mechanism.tree_of_body, masses, minlength=len(mechanism.tree_dofs))
+    trees = len(mechanism.tree_dofs)
+    found = np.bincount(mechanism.tree_of_body, mechanism.arrays.mass, minlength=trees)
     inertia = np.diagonal(mechanism.mass_matrix(start_of(scene)[0]))
     turned = [inertia[slice(*dofs)].max(initial=0.0) for dofs in mechanism.tree_dofs]
     return np.where(found > 0.0, found, turned)
@@ -294,7 +294,7 @@ def stops_of(scene: Scene, mechanism: Mechanism) -> Stops:
     then their whole mass, and stiffness and damping act as at a contact.
     """
     arrays = mechanism.arrays
-    carried = np.array([body.mass for body in scene.bodies])
+    carried = arrays.mass.copy()
     for i, parent in reversed([*enumerate(arrays.parent.tolist())]):
         if parent >= 0:
             carried[parent] += carried[i]
