@@ -45,6 +45,7 @@ from iapb.loop import (
     make_record,
     run_steps,
 )
+from iapb.mechanics.bodies import finite_array
 from iapb.numerics.compiled import Entry
 from iapb.numerics.schema import Floats
 from iapb.recording import Recorder
@@ -237,11 +238,8 @@ class Simulation:
                 expected = f"a count from 0 to {most}, the size of its buffer"
                 raise ArgumentError(f"{law} {what}", given, expected)
         for name in _STEP_VECTORS:
-            values = np.asarray(getattr(result, name))
             target = getattr(state, name)
-            if values.shape != target.shape or not np.isfinite(values).all():
-                raise ArgumentError(f"{law} {name}", values, f"{len(target)} finite numbers")
-            target[:] = values
+            target[:] = finite_array(f"{law} {name}", getattr(result, name), target.shape)
         tool = self.system.tool_tree
         state.state_of_tree[tool if tool >= 0 else slice(None)] = result.state
 

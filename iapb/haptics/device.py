@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from iapb.errors import ArgumentError, IapbError
+from iapb.errors import ArgumentError
 from iapb.haptics.rendering import NO_COUPLING, UNILATERAL, engage
 from iapb.mechanics.bodies import finite_array
 from iapb.numerics.compiled import Entry
@@ -187,9 +187,4 @@ class DeviceLink:
         reading = self.device.read()
         for name, target in (("q", self._port.device_q), ("v", self._port.device_v)):
             values = getattr(reading, name)
-            read = np.asarray(values, np.float64)
-            if read.shape != target.shape or not np.all(np.isfinite(read)):
-                raise IapbError(
-                    f"the device read {name} = {values!r}: expected {len(target)} finite numbers"
-                )
-            target[:] = read
+            target[:] = finite_array(f"the device read {name}", values, target.shape)

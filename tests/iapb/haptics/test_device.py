@@ -155,7 +155,7 @@ def test_a_reading_that_is_no_position_stops_the_loop(q):
     simulation = Simulation(PEG, LAW, coupling_of(PEG, "four-channel"), device)
     simulation.step()
     device.q = q
-    with pytest.raises(IapbError, match="the device read q = .*expected 3 finite numbers"):
+    with pytest.raises(IapbError, match="the device read q.* = .*: expected "):
         simulation.step()
 
 
