@@ -25,7 +25,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from iapb.contact.impact import real_numbers
 from iapb.contact.laws import ContactLaw, ImpulseAugmented, Penalty, StepResult, copied_step
 from iapb.effects import decide
 from iapb.engines import Engine, is_engine
@@ -45,7 +44,7 @@ from iapb.loop import (
     make_record,
     run_steps,
 )
-from iapb.mechanics.bodies import finite_array
+from iapb.mechanics.bodies import finite_array, real_numbers
 from iapb.numerics.compiled import Entry
 from iapb.numerics.schema import Floats
 from iapb.recording import Recorder
@@ -209,9 +208,9 @@ class Simulation:
             raise ArgumentError(
                 "hand_force", hand_force, f"None: scene {self.scene.name} has no hand"
             )
-        given = real_numbers(hand_force)
-        force = np.zeros(0) if given is None else given.astype(np.float64)
-        if force.shape not in ((3,), (6,)) or not np.all(np.isfinite(force)):
+        force = real_numbers(hand_force)
+        good = force is not None and force.shape in ((3,), (6,)) and np.isfinite(force).all()
+        if force is None or not good:
             raise ArgumentError("hand_force", hand_force, "3 (plane) or 6 (space) finite numbers")
         self._planned = False
         self.port.wrench[:] = 0.0

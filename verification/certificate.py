@@ -18,10 +18,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from iapb.contact.impact import real_numbers
 from iapb.contact.kernels.passive import gain_signs
 from iapb.contact.laws import ENGINE_LAWS, ImpulseAugmented
 from iapb.errors import ArgumentError, IapbError
+from iapb.mechanics.bodies import real_numbers
 from iapb.numerics.schema import Booleans, Floats, Integers
 from iapb.run import Run, digests
 from iapb.scene.mechanism import mechanism_of, start_of

@@ -10,11 +10,10 @@ from __future__ import annotations
 
 import threading
 from functools import lru_cache
-from numbers import Real
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from iapb.contact.kernels.resolve import (
     LARGEST_ENTRY,
@@ -27,6 +26,7 @@ from iapb.contact.kernels.resolve import (
 )
 from iapb.contact.kernels.unilateral import ShareWork
 from iapb.errors import ArgumentError, IapbError, RangeError, SolverError, counted
+from iapb.mechanics.bodies import real_numbers
 from iapb.names import one_of
 from iapb.numerics.compiled import Entry, block
 from iapb.numerics.linalg import cholesky
@@ -466,25 +466,6 @@ def _checked(names: tuple[str, str, str], mass_matrix: Any, jacobian: Any, veloc
         shape = ", ".join(map(str, (*lead, "contacts", d)))
         raise ArgumentError(names[1], J.shape, f"shape ({shape})")
     return M, J, v
-
-
-def real_numbers(value: Any) -> NDArray[Any] | None:
-    """Return the value as an array; None for strings, truth values, time spans, complex numbers and
-    masked arrays."""
-    try:
-        given = np.asarray(value)
-    except (TypeError, ValueError):
-        return None
-    if isinstance(value, np.ma.MaskedArray):
-        return None
-    if given.dtype.kind == "O":
-        if not all(isinstance(x, Real) and not isinstance(x, bool) for x in given.flat):
-            return None
-        try:
-            return given.astype(np.float64)
-        except OverflowError:  # a whole number that no double reaches
-            return np.full(given.shape, np.inf)
-    return given if given.dtype.kind in "fiu" else None
 
 
 def _array(name: str, value: Any, dimensions: int) -> Floats:

@@ -5,10 +5,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from numbers import Real
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from iapb.errors import ArgumentError
 from iapb.mechanics.joints import Joint, Mimic
@@ -20,15 +21,32 @@ ROTATION_TOLERANCE = 1e-8
 SYMMETRY_TOLERANCE = 1e-12
 
 
+def real_numbers(value: Any) -> NDArray[Any] | None:
+    """Return the value as an array; None for strings, truth values, time spans, complex numbers and
+    masked arrays."""
+    try:
+        given = np.asarray(value)
+    except (TypeError, ValueError):
+        return None
+    if isinstance(value, np.ma.MaskedArray):
+        return None
+    if given.dtype.kind == "O":
+        if not all(isinstance(x, Real) and not isinstance(x, bool) for x in given.flat):
+            return None
+        try:
+            return given.astype(np.float64)
+        except OverflowError:  # a whole number that no double reaches
+            return np.full(given.shape, np.inf)
+    return given if given.dtype.kind in "fiu" else None
+
+
 def float_array(argument: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
     """Return value as a contiguous float array of that shape (-1 first: any length), or raise
     ArgumentError."""
-    try:
-        array = np.asarray(value, np.float64, "C")
-    except (TypeError, ValueError):
-        raise ArgumentError(
-            argument, value, f"numbers of shape {shape}".replace("-1", "n")
-        ) from None
+    given = real_numbers(value)
+    if given is None:
+        raise ArgumentError(argument, value, f"numbers of shape {shape}".replace("-1", "n"))
+    array = given.astype(np.float64, "C", copy=False)
     many = shape[:1] == (-1,) and array.ndim == len(shape) and array.shape[1:] == shape[1:]
     if array.shape != shape and not many:
         raise ArgumentError(f"{argument} of shape", array.shape, str(shape).replace("-1", "n"))
