@@ -70,14 +70,15 @@ class System:
         self.shapes = scene_parts.shapes_of(scene)
         self.pairs, self.remarks = scene_parts.pairs_of(scene, self.mechanism, self.shapes)
         self.stops = scene_parts.stops_of(scene, self.mechanism)
-        self.most_contacts = contact_capacity(self.shapes, self.pairs) + len(self.stops.bound)
+        stops = len(self.stops.bound)
+        self.most_contacts = contact_capacity(self.shapes, self.pairs) + stops
         # a step that is cut also keeps those that have struck and are apart
         self.capacity = self.most_contacts * (2 if scene.contact.at_touch else 1)
         self.joint_damping = scene_parts.joint_damping_of(scene, self.mechanism)
         self.joint_friction = scene_parts.joint_friction_of(scene, self.mechanism)
         self.start = scene_parts.start_of(scene)
-        self.restitutions = scene_parts.restitutions_of(scene, self.pairs)
-        self.frictions = scene_parts.frictions_of(scene)
+        self.restitutions = scene_parts.restitutions_of(scene, self.pairs, stops)
+        self.frictions = scene_parts.frictions_of(scene, stops)
         self.dt = 1.0 / scene.rate
         self.gravity = scene_parts.gravity_of(scene)
         self.tangents = 2 if isinstance(scene, SpatialScene) else 1
@@ -177,7 +178,7 @@ class System:
                 friction=self.frictions.table,
                 tangents=self.tangents,
                 restitution=float(restitution),
-                own_restitution=scene_parts.restitution_by_shape(scene),
+                own_restitution=scene_parts.restitution_by_shape(scene, len(self.stops.bound)),
                 per_body_rows=contact.self_collision_rows == "per_body",
                 joint_damping=self.joint_damping,
                 joint_friction=self.joint_friction,

@@ -27,6 +27,7 @@ from iapb.contact.finding import Contacts
 from iapb.contact.kernels.implicit import COMPLIANCE, FADING
 from iapb.contact.kernels.touch import MOST_SAMPLES
 from iapb.contact.solids import joined
+from iapb.effects import numbers
 from iapb.errors import counted
 from iapb.names import in_metres
 from iapb.numerics.schema import Floats, Integers
@@ -664,7 +665,7 @@ def _coupled(start: Start, coupling: str) -> Iterator[Caution]:
             "sensors",
             f"{coupling} coupling",
             f"one step of the sensors changes the velocity, by the {coupling} coupling, by {share:.2g} of "
-            f"what the hand does in {MOVED:g} s: set device.position_resolution <= {_listed(least)}, or "
+            f"what the hand does in {MOVED:g} s: set device.position_resolution <= {numbers(least)}, or "
             "smaller gains",
         )
 
@@ -692,7 +693,7 @@ def _growing(start: Start, coupling: str, loops: dict[str, HapticLoop], where: s
         factors = nearest(holds, tried)
         if factors is not None:
             limits = {name: getattr(loop, name) * factors[name] for name in fields}
-            said = [f"{path}.{name} <= {_listed(map(_down, x))}" for name, x in limits.items()]
+            said = [f"{path}.{name} <= {numbers(map(_down, x))}" for name, x in limits.items()]
             remedies.append(" and ".join(said))
             break
     shorter = range(loop.delay - 1, -1, -1)
@@ -759,10 +760,6 @@ def _loops(start: Start, coupling: str) -> dict[str, HapticLoop]:
         if not scaled(wall, dict.fromkeys(MARGIN, 0.0)).grows:  # else the contact is to blame
             loops[f"while {start.names(rows)} touch"] = wall
     return loops
-
-
-def _listed(values: Iterable[float]) -> str:
-    return f"[{', '.join(f'{x:g}' for x in values)}]"
 
 
 def _up(x: float, way: Callable[[float], int] = math.ceil, slack: float = 1.0 - ROUNDED) -> float:

@@ -319,20 +319,14 @@ def stops_of(scene: Scene, mechanism: Mechanism) -> Stops:
     )
 
 
-def _stop_count(scene: Scene) -> int:
-    return 2 * sum(limits is not None for limits in limits_of(scene))
-
-
-def restitution_by_shape(scene: Scene) -> Floats:
+def restitution_by_shape(scene: Scene, stops: int = 0) -> Floats:
     """Return the restitution (n,) that the body or wall of each shape gives; UNSTATED if it gives
     none.
 
     The shapes have the order of `shapes_of`. The stops of the joints follow; they give no
     restitution.
     """
-    given = [owner.restitution for _, owner, _ in _owned_shapes(scene)] + [None] * _stop_count(
-        scene
-    )
+    given = [owner.restitution for _, owner, _ in _owned_shapes(scene)] + [None] * stops
     return np.array([UNSTATED if e is None else e for e in given], np.float64)
 
 
@@ -347,12 +341,11 @@ def restitution_by_pair(scene: Scene, pairs: Pairs) -> Floats:
     return np.where(smaller > 1.0, scene.contact.restitution, smaller)
 
 
-def restitutions_of(scene: Scene, pairs: Pairs) -> Floats:
+def restitutions_of(scene: Scene, pairs: Pairs, stops: int) -> Floats:
     """Return the distinct values of e among the candidate pairs (k, 2) of shapes and the joints'
     stops, ascending."""
-    stops = [scene.contact.restitution] if _stop_count(scene) else []
-    found = np.concatenate([restitution_by_pair(scene, pairs), stops])
-    return np.array(sorted(set(found.tolist())))
+    of_stops = [scene.contact.restitution] * stops
+    return np.unique(np.append(restitution_by_pair(scene, pairs), of_stops))
 
 
 class Frictions(NamedTuple):
@@ -367,7 +360,7 @@ class Frictions(NamedTuple):
         return self.table[self.class_of_shape[pairs[:, 0]], self.class_of_shape[pairs[:, 1]]]
 
 
-def frictions_of(scene: Scene) -> Frictions:
+def frictions_of(scene: Scene, stops: int) -> Frictions:
     """Return mu of all pairs of shapes, in the order of `shapes_of`. The joints' stops follow, with
     mu = 0.
 
@@ -378,7 +371,6 @@ def frictions_of(scene: Scene) -> Frictions:
     general = scene.contact.friction
     given = [owner.friction for _, owner, _ in _owned_shapes(scene)]
     values = list(dict.fromkeys(given))
-    stops = _stop_count(scene)
     table = np.zeros((len(values) + (stops > 0),) * 2)
     for (i, first), (k, second) in itertools.product(enumerate(values), repeat=2):
         own = [mu for mu in (first, second) if mu is not None] or [general]

@@ -246,15 +246,12 @@ class Hand(ScenePart):
         IapbError
             An expression has no finite value at this time.
         """
-        force = list(self.force)
+        parts: list[Iterable[float]] = [self.force]
         if self.force_table:
-            force = [a + b for a, b in zip(force, _between(self.force_table, time), strict=True)]
+            parts.append(_between(self.force_table, time))
         if self.force_function:
-            force = [
-                a + function_of(text)(time)
-                for a, text in zip(force, self.force_function, strict=True)
-            ]
-        return force
+            parts.append(function_of(text)(time) for text in self.force_function)
+        return [sum(each) for each in zip(*parts, strict=True)]
 
     def largest_force(self) -> float:
         """Return the magnitude of the largest force [N] at t = 0 and at the table's times."""
@@ -273,11 +270,9 @@ class Hand(ScenePart):
 def _between(rows: tuple[tuple[float, ...], ...], time: float) -> list[float]:
     """Return the force at a time, by linear interpolation between the rows."""
     k = bisect.bisect_right(rows, time, key=lambda row: row[0])
-    if k == 0 or k == len(rows):
-        return list(rows[0 if k == 0 else -1][1:])
-    (start, *first) = rows[k - 1]
-    (stop, *last) = rows[k]
-    share = (time - start) / (stop - start)
+    start, *first = rows[max(k - 1, 0)]
+    stop, *last = rows[min(k, len(rows) - 1)]
+    share = (time - start) / (stop - start) if stop > start else 0.0
     return [a + share * (b - a) for a, b in zip(first, last, strict=True)]
 
 
