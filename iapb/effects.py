@@ -74,7 +74,8 @@ class Question:
     @cached_property
     def frictions(self) -> list[float]:
         """Different values of mu among the pairs, ascending."""
-        return sorted(set(self.system.frictions.by_pair(self.system.pairs).tolist()))
+        found: list[float] = np.unique(self.system.frictions.by_pair(self.system.pairs)).tolist()
+        return found
 
     @cached_property
     def device(self) -> Device:

@@ -81,9 +81,7 @@ def _engine_named(name: str) -> Engine:
     """Import an engine by name: an object, or a class that makes one without arguments."""
     found: Any = object_named("world", name, "module:engine")
     engine: Any = found() if isinstance(found, type) else found
-    if not is_engine(engine):
-        raise ArgumentError(
-            "world", name, "an engine: an object with name, settings, ignored(scene) and run(scene)"
-        )
-    made: Engine = engine
-    return made
+    if is_engine(engine):
+        return engine
+    expected = "an engine: an object with name, settings, ignored(scene) and run(scene)"
+    raise ArgumentError("world", name, expected)

@@ -175,8 +175,7 @@ class Start:
     @cached_property
     def friction(self) -> Floats:
         """Coefficient of each contact."""
-        classes, table = self.system.frictions
-        return np.asarray(table[classes[self.found.shape_a], classes[self.found.shape_b]])
+        return self.system.frictions.by_pair(np.stack(self.found[:2], axis=1))
 
     @cached_property
     def thickness(self) -> Floats:
