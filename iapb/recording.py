@@ -59,9 +59,9 @@ class Recorder:
         system = simulation.system
         states: dict[str, Any] = port.members | state.members
         self.start = {each.name: states[each.name].copy() for each in STATES}
-        self.coordinates = len(state.q), len(state.v), len(port.device_q), len(port.device_v)
+        self.coordinates: Any = tuple(map(len, self.start.values()))
         self.shape = self.coordinates, system.capacity, system.most_impacts
-        self._line_bytes = sum(array.nbytes for array in make_record(1, *self.shape).arrays()[1:])
+        self._line_bytes = _bytes_of_lines(*self.shape)
         self.records: list[Any] = []  # of the steps held
         self.timings: list[tuple[int, float]] = []  # steps and seconds of each chunk
         self.first = 0  # number of steps before those held
@@ -73,8 +73,7 @@ class Recorder:
     def bytes_per_step(self) -> int:
         """Bytes that a kept step without contacts adds to a run: lines (twice, for joining) and
         energies."""
-        lines = make_record(1, self.coordinates, 0, 0).arrays()[1:]
-        return 2 * sum(array.nbytes for array in lines) + 8 * len(FORCES) + 40
+        return 2 * _bytes_of_lines(self.coordinates, 0, 0) + 8 * len(FORCES) + 40
 
     def chunk(self, total: int, most: int | None = None) -> BaseException | None:
         """Simulate and record the next chunk, of at most `most` steps; return the exception that
@@ -192,6 +191,12 @@ class Recorder:
             device=device,
             before=self._before,
         )
+
+
+def _bytes_of_lines(coordinates: Any, contacts: int, impacts: int) -> int:
+    """Return the bytes of the record of a step."""
+    _, *lines = make_record(1, coordinates, contacts, impacts).arrays()
+    return sum(array.nbytes for array in lines)
 
 
 def _mass_digests(system: Any, places: Floats) -> NDArray[np.int64]:

@@ -278,10 +278,7 @@ class Start:
         """Groups of contacts that carry loads: those that touch, and the first pair that a falling
         tree hits."""
         touched = {
-            int(tree[i])
-            for rows in self.touching
-            for i in rows
-            for tree in (self.tree_a, self.tree_b)
+            tree for rows in self.touching for tree in (*self.tree_a[rows], *self.tree_b[rows])
         }
         falls: dict[int, Rows] = {}
         for rows in self.by_pair:
