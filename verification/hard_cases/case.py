@@ -6,11 +6,13 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import cached_property
+from functools import cache, cached_property
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+from ruamel.yaml import YAML
 
 from iapb.run import Run
 from iapb.scene import Scene, scene_from_text
@@ -187,48 +189,16 @@ class TrajectoryCase:
 AnyCase = HardCase | TrajectoryCase
 
 
-def on_floor(
-    name: str,
-    title: str,
-    bodies: list[dict[str, Any]],
-    contact: dict[str, Any],
-    *,
-    duration: float,
-    source: str = "textbook",
-    rate: float = 1000.0,
-    gravity: tuple[float, float] | None = (0.0, -9.81),
-    level: float = 0.0,
-    **more: Any,
-) -> Scene:
-    """Return a scene in the plane with the paper's forces; `more` are other sections, such as walls
-    in place of the floor at a level [m]."""
-    floor = {"name": "floor", "kind": "half_plane", "point": [0.0, level], "normal": [0.0, 1.0]}
-    given = {
-        "name": name,
-        "title": title,
-        "source": source,
-        "rate": rate,
-        "duration": duration,
-        "gravity": gravity,
-        "bodies": bodies,
-        "walls": [floor],
-        "contact": {"forces": "paper", **contact},
-        **more,
-    }
-    return scene_from_text(json.dumps(given))
+@cache
+def _scenes() -> dict[str, dict[str, Any]]:
+    path = Path(__file__).with_name("scenes.yaml")
+    found: dict[str, dict[str, Any]] = YAML(typ="safe").load(path)
+    return found
 
 
-def ball(name: str, radius: float, at: float, **more: Any) -> dict[str, Any]:
-    """Return a ball of 1 kg that moves along x [m]; `more` are other fields of the body."""
-    return {
-        "name": name,
-        "joint": "prismatic",
-        "axis": [1, 0],
-        "mass": 1.0,
-        "position": [at],
-        "shapes": [{"kind": "circle", "radius": radius}],
-        **more,
-    }
+def scene_named(name: str) -> Scene:
+    """Return a scene of scenes.yaml."""
+    return scene_from_text(json.dumps(_scenes()[name]))
 
 
 def largest_gain(run: Run) -> float:

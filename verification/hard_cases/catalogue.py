@@ -1,5 +1,5 @@
 """The catalogue of hard cases. To add one, write it in impacts.yaml or as a function that returns
-it; name it here."""
+it, its scene in scenes.yaml; name it here."""
 
 from __future__ import annotations
 
@@ -145,12 +145,16 @@ HARD_CASES: dict[str, Callable[[], AnyCase]] = {
         "step, creates energy",
     ),
     **_named(motions.wedged_peg_motion),
-    "touching_cradle": partial(motions.cradle, 0.0, "touching exactly"),
+    "touching_cradle": partial(motions.cradle, "touching_cradle", "touching exactly"),
     "touching_cradle_in_centimetres": partial(
-        motions.cradle, 0.0, "touching but for rounding", 0.01
+        motions.cradle, "touching_cradle_in_centimetres", "touching but for rounding"
     ),
-    "cradle_a_micrometre_apart": partial(motions.cradle, 1e-6, "a micrometre apart"),
-    "cradle_a_micrometre_sunk": partial(motions.cradle, -1e-6, "sunk by a micrometre"),
+    "cradle_a_micrometre_apart": partial(
+        motions.cradle, "cradle_a_micrometre_apart", "a micrometre apart"
+    ),
+    "cradle_a_micrometre_sunk": partial(
+        motions.cradle, "cradle_a_micrometre_sunk", "sunk by a micrometre", 1e-6
+    ),
     **_named(friction.double_pendulum_motion),
     "sticking_threshold": partial(
         friction.pushed,
@@ -172,11 +176,7 @@ HARD_CASES: dict[str, Callable[[], AnyCase]] = {
         friction.stick_slip,
         sticking.nudged_box,
     ),
-    "box_on_a_slope": partial(
-        sticking.on_a_slope, "Box that sticks on a slope", "box_on_a_slope", 1, sticking.BOX
-    ),
-    "stack_on_a_slope": partial(
-        sticking.on_a_slope, "Stack that sticks on a slope", "stack_on_a_slope", 3, sticking.SLAB
-    ),
+    "box_on_a_slope": partial(sticking.on_a_slope, "box_on_a_slope"),
+    "stack_on_a_slope": partial(sticking.on_a_slope, "stack_on_a_slope"),
     **_named(motions.chatter),
 }

@@ -23,39 +23,17 @@ from verification.hard_cases.case import (
     NO_GAIN,
     Measured,
     TrajectoryCase,
-    ball,
     largest_gain,
-    on_floor,
+    scene_named,
 )
 
 _G = 9.81
-_IMPLICIT = {"forces": "implicit"}
 _WORLDS = ("IAPB", "PB", "ideal-friction")
 
 # --- Kane and Levinson's double pendulum
 # -----------------------------------------------------------------------
 _SOURCE = "Kane and Levinson, Dynamics: Theory and Applications (1985); Kane (1984); angles and speeds ours"
 _FLOOR = -(12 / 13 + 15 / 17) - 1e-3  # [m] height of the floor: a millimetre below the tip
-_ROD_BODY = {"joint": "revolute", "mass": 1.0, "center_of_mass": [0.5, 0.0], "inertia": 1.0 / 12.0}
-_PENDULUM = [
-    {"name": "upper", **_ROD_BODY, "position": [math.atan2(5, 12) - math.pi / 2]},
-    {
-        "name": "lower",
-        "parent": "upper",
-        **_ROD_BODY,
-        "origin": [1.0, 0.0],
-        "velocity": [-0.1],
-        "shapes": [{"kind": "circle", "radius": 1e-6, "center": [1.0, 0.0]}],
-        "position": [math.atan2(8, 15) - math.atan2(5, 12)],
-    },
-]
-_ON_TIP = _IMPLICIT | {
-    "restitution": 0.5,
-    "friction": 0.5,
-    "stiffness": 1e4,
-    "damping": 100.0,
-    "coherence_distance": 1e-2,
-}
 
 
 def double_pendulum_motion() -> TrajectoryCase:
@@ -68,16 +46,7 @@ def double_pendulum_motion() -> TrajectoryCase:
         "kinetic plus potential energy never exceeds its initial value; until the tip touches, "
         "the motion follows "
         "from the equations of two rods, integrated to twelve digits",
-        on_floor(
-            "kane_levinson",
-            "Kane and Levinson's double pendulum on a rough floor",
-            _PENDULUM,
-            _ON_TIP,
-            source=_SOURCE,
-            rate=2000,
-            duration=0.5,
-            level=_FLOOR,
-        ),
+        scene_named("double_pendulum_motion"),
         _measure_pendulum,
         worlds=("IAPB", "PB", "ideal", "ideal-friction"),
     )
@@ -165,46 +134,15 @@ def creep_of_the_regularised_law() -> TrajectoryCase:
         "the paper's law (6) never sticks: the block must creep at the speed that the law gives, no faster",
         "after a few steps the block creeps at 0.99 times 1 mm/s, the speed below which (6) is viscous",
         "equation (6) of the paper for one coordinate, step by step",
-        _block(0.99, "paper"),
+        _block(0.99).with_values({"contact.forces": "paper"}),
         measure,
         ("IAPB", "PB"),
     )
 
 
-def _block(share: float, forces: str = "implicit") -> Scene:
-    depth = _G / (
-        2.0 * 1e4
-    )  # static overlap of the block on two springs; friction acts at half of it
-    block = {
-        "name": "block",
-        "joint": "planar",
-        "mass": 1.0,
-        "inertia": 0.0020833333333333333,
-        "shapes": [{"kind": "box", "size": [0.15, 0.05]}],
-        "position": [0.0, 0.025 - depth, 0.0],
-    }
-    hand = {
-        "body": "block",
-        "point": [0.0, -(0.025 - 0.5 * depth)],
-        "force": [share * _MU * _G, 0.0, 0.0],
-    }
-    contact = {
-        "forces": forces,
-        "stiffness": 1e4,
-        "damping": 100.0,
-        "friction": _MU,
-        "friction_velocity": _CREEP,
-        "coherence_distance": 2e-3,
-    }
-    return on_floor(
-        "pushed_block",
-        "A block pushed along the floor",
-        [block],
-        contact,
-        rate=4000,
-        duration=_DURATION,
-        hand=hand,
-    )
+def _block(share: float) -> Scene:
+    """Return the scene of the block with a hand that pushes with this share of μ m g."""
+    return scene_named("pushed_block").with_values({"hand.force": [share * _MU * _G, 0.0, 0.0]})
 
 
 def pushed(share: float, name: str, expected: str) -> TrajectoryCase:
@@ -246,22 +184,6 @@ _MOBILITY = 1.0 + 3.0 * _COSINE * (
 )  # [1/kg] of the sliding contact: negative
 _GROWTH = math.sqrt(-_MOBILITY * _STIFF)  # [1/s] σ: the overlap grows as exp(σ t) at first
 
-_ROD = {
-    "name": "rod",
-    "joint": "planar",
-    "mass": 1.0,
-    "inertia": 1.0 / 12.0,
-    "velocity": [-_SPEED, 0.0, 0.0],
-    "shapes": [{"kind": "circle", "radius": 1e-6, "center": [-0.5, 0.0]}],
-    "position": [0.0, _HEIGHT, math.atan2(_SINE, _COSINE)],
-}
-_ON_END = _IMPLICIT | {
-    "stiffness": _STIFF,
-    "damping": 0.0,
-    "friction": _ROUGH,
-    "coherence_distance": 5e-3,
-}
-
 
 def painleve_rod() -> TrajectoryCase:
     """A rod slides on its lower end with μ = 2: its effective inertia is negative, so no finite
@@ -274,15 +196,7 @@ def painleve_rod() -> TrajectoryCase:
         "and with springs the force grows without bound",
         "the rod jams: with a rigid contact at once, with a spring as soon as the force is large enough",
         f"the equations of motion: with springs the slip stops after {1e3 * _slipping()[0]:.1f} ms; if rigid, at once",
-        on_floor(
-            "painleve_rod",
-            "Painlevé's rod",
-            [_ROD],
-            _ON_END,
-            source="Painlevé (1895)",
-            rate=8000,
-            duration=0.1,
-        ),
+        scene_named("painleve_rod"),
         _measure_rod,
         _WORLDS,
     )
@@ -343,9 +257,7 @@ def _measure_rod(run: Run) -> Measured:
 # --- a plate pushed by a spring: stick-slip
 # ----------------------------------------------------------------------- The spring is a contact: a
 # ball of 1e8 kg with constant speed presses on the edge of a plate of 1 kg.
-# spring [N/m], duration [s]
-_PRESS = 1e4
-_PRESSED = 0.5
+_PRESS = 1e4  # spring [N/m]
 _DAMPED = 10.0  # damper of the contact [N s/m]
 _STEADY = 0.01  # speed of the ball [m/s]
 _OMEGA = math.sqrt(_PRESS)  # [rad/s] of the plate on the spring, without the damper
@@ -354,9 +266,6 @@ _SWING = math.sqrt(_OMEGA**2 - _DECAY**2)  # [rad/s] with the damper
 _SLIDING = (
     _MU * _G / _PRESS
 )  # the spring's depth [m] in steady sliding; the start has 1.5 times this depth
-# the plate's height and the ball's radius [m]
-_THICK = 2e-3
-_THIN = 4e-4
 # Error of a step Δt in units of ωΔt times the swing V/ω. The force acts at the end of the step, as
 # if the contact had another damper KΔt, so the swing decays faster by ω²Δt/2. It loses ½ω²Δt t
 # exp(−at) of its size, at most ω²Δt/(2 e a), with a the decay rate and e Euler's number. The stick
@@ -368,26 +277,6 @@ def stick_slip() -> TrajectoryCase:
     """A plate of 1 kg on a rough floor, pushed by a spring and damper whose other end moves at
     constant speed."""
     swing = _STEADY / _OMEGA
-    depth = 1.5 * _SLIDING
-    height = 0.5 * _THICK - _G / (2.0 * _PRESS)
-    plate = {
-        "name": "plate",
-        "joint": "planar",
-        "mass": 1.0,
-        "inertia": 0.001875,
-        "velocity": [_STEADY, 0.0, 0.0],
-        "shapes": [{"kind": "box", "size": [0.15, _THICK]}],
-        "position": [0.0, height, 0.0],
-    }
-    presses = ball(
-        "ball", _THIN, 0.0, origin=[-0.075 - _THIN + depth, height], mass=1e8, velocity=[_STEADY]
-    )
-    contact = _IMPLICIT | {
-        "stiffness": _PRESS,
-        "damping": _DAMPED,
-        "friction": _MU,
-        "coherence_distance": 2e-3,
-    }
 
     def measure(run: Run) -> Measured:
         """Measure the largest distance from the closed form, relative to the swing V/ω, and the
@@ -407,14 +296,7 @@ def stick_slip() -> TrajectoryCase:
         "the plate stops and starts again where the forces on it are exactly at the limit of friction, μ m g",
         "the plate slides, sticks once, and slides on; its swing on the spring decays, so it never sticks again",
         "closed form: a damped swing while the plate slides, at rest while spring and damper press less than μ m g",
-        on_floor(
-            "stick_slip",
-            "A plate pushed by a spring",
-            [plate, presses],
-            contact,
-            rate=4000,
-            duration=_PRESSED,
-        ),
+        scene_named("stick_slip"),
         measure,
         ("IAPB", "PB"),
     )

@@ -14,9 +14,8 @@ from verification.hard_cases.case import (
     NO_GAIN,
     Measured,
     TrajectoryCase,
-    ball,
     largest_gain,
-    on_floor,
+    scene_named,
 )
 
 # --- a ball that chatters
@@ -34,12 +33,6 @@ _FALL = math.sqrt(2.0 * _HEIGHT / _GRAVITY)  # [s] until the first bounce
 _END_OF_BOUNCES = _FALL * (
     1.0 + 2.0 * _RESTITUTION / (1.0 - _RESTITUTION)
 )  # [s], the sum of all flights
-_HARD = {
-    "restitution": _RESTITUTION,
-    "stiffness": 1e5,
-    "damping": 200.0,
-    "coherence_distance": 5e-3,
-}
 
 
 def chatter() -> TrajectoryCase:
@@ -50,13 +43,7 @@ def chatter() -> TrajectoryCase:
         "the bounces accumulate at one instant: an event-driven method never passes it, time stepping may bounce on",
         "the ball follows the parabolas as far as the time step resolves them, then it rests",
         f"closed form: after bounce k a parabola of height h e²ᵏ; at rest from {_END_OF_BOUNCES:.4f} s on",
-        on_floor(
-            "chatter",
-            "A ball that chatters to rest",
-            [ball("ball", _RADIUS, _RADIUS + _HEIGHT, axis=[0, 1])],
-            _HARD,
-            duration=1.0,
-        ),
+        scene_named("chatter"),
         _measure_chatter,
     )
 
@@ -207,41 +194,22 @@ _CRADLE_STIFFNESS = 1e4
 _BY_SPRINGS = 2.0 * _CRADLE_STIFFNESS * 1e-6
 
 
-def cradle(gap: float, words: str, radius: float = 0.015625) -> TrajectoryCase:
-    """A cradle whose balls are a gap apart; radii of whole centimetres leave gaps of a few 1e-18 m
-    of either sign.
+def cradle(scene: str, words: str, sunk: float = 0.0) -> TrajectoryCase:
+    """A cradle whose balls are a gap apart, or sunk into each other [m]; radii of whole centimetres
+    leave gaps of a few 1e-18 m of either sign.
 
     A contact counts as new until it overlaps, so contacts with a gap of exactly 0 collide like
     those with a gap of one micrometre. If they counted as old, springs would transmit the impact.
     Springs that are sampled once per step gain up to 2 K Δt²/m, which is 0.21 % here, as the world
     PB shows.
     """
-    places = [-0.021875 - 2.0 * radius] + [k * (2.0 * radius + gap) for k in range(4)]
-    balls = [ball(f"ball_{k}", radius, x, velocity=[float(k == 0)]) for k, x in enumerate(places)]
-    contact = {
-        "stiffness": _CRADLE_STIFFNESS,
-        "damping": 0.0,
-        "restitution": 1.0,
-        "coherence_distance": 2e-3,
-    }
-    scene = on_floor(
-        "touching_cradle",
-        "Newton's cradle whose balls touch",
-        balls,
-        contact,
-        duration=0.3,
-        gravity=None,
-        walls=[],
-    )
 
     def measure(run: Run) -> Measured:
         """Measure the relative error of momentum and energy at the end; both must equal those of
         the first ball."""
         v = run.v[-1]
         off = max(abs(float(v.sum()) - 1.0), abs(float(v @ v) - 1.0))
-        stored = (
-            3.0 * 0.5 * _CRADLE_STIFFNESS * min(gap, 0.0) ** 2 / 0.5
-        )  # share of the energy in springs
+        stored = 3.0 * 0.5 * _CRADLE_STIFFNESS * sunk**2 / 0.5  # share of the energy in springs
         # Sampling the springs once per step adds up to a tenth.
         return Measured(largest_gain(run), NO_GAIN + 1.1 * stored, off, _BY_SPRINGS)
 
@@ -251,6 +219,6 @@ def cradle(gap: float, words: str, radius: float = 0.015625) -> TrajectoryCase:
         "new contacts transmit momentum by impulses, lasting ones by springs; rounding may decide if one is new",
         "momentum and energy are conserved, whichever balls leave",
         "momentum and energy of five equal elastic balls, the first at 1 m/s: Σ v = 1 and Σ v² = 1",
-        scene,
+        scene_named(scene),
         measure,
     )

@@ -9,62 +9,25 @@ Here μ N Δt / (m v_threshold) is 4.9 for one box at the default threshold.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
 from iapb.run import Run
-from iapb.scene import Scene
-from verification.hard_cases.case import NO_GAIN, Measured, TrajectoryCase, largest_gain, on_floor
+from verification.hard_cases.case import (
+    NO_GAIN,
+    Measured,
+    TrajectoryCase,
+    largest_gain,
+    scene_named,
+)
 
 _G = 9.81
 _MU = 0.5
 _ENGINE = ("IAPB", "PB", "IAPB-friction")
-# Width and height [m], stiffness [N/m]. The slabs of a stack oscillate on their springs without
-# slipping.
-BOX = (0.15, 0.05, 1e4)
-SLAB = (0.3, 0.02, 5e4)
-_LONG = 10.0  # [s]
 _SECOND_ORDER = (
     0.02  # relative error of the lean per box: the contact point lies at half the overlap
 )
-
-
-def _boxes(
-    name: str, title: str, count: int, sort: tuple[float, float, float], slope: float, speed: float
-) -> Scene:
-    """Return a scene of boxes of 1 kg on one another on a slope [rad]; each starts with its static
-    overlap."""
-    (width, height, stiffness) = sort
-    level = 0.0
-    boxes = []
-    for k in range(count):
-        level += height - (count - k) * _G * math.cos(slope) / (2.0 * stiffness)
-        boxes.append(
-            {
-                "name": f"box_{k}",
-                "joint": "planar",
-                "mass": 1.0,
-                "inertia": (width**2 + height**2) / 12.0,
-                "position": [0.0, level - 0.5 * height, 0.0],
-                "velocity": [speed, 0.0, 0.0],
-                "shapes": [{"kind": "box", "size": [width, height]}],
-            }
-        )
-    contact = {
-        "forces": "implicit",
-        "stiffness": stiffness,
-        "damping": 50.0,
-        "friction": _MU,
-        "coherence_distance": 2e-3,
-    }
-    return on_floor(
-        name,
-        title,
-        boxes,
-        contact,
-        duration=_LONG,
-        gravity=(_G * math.sin(slope), -_G * math.cos(slope)),
-    )
 
 
 def nudged_box() -> TrajectoryCase:
@@ -90,18 +53,20 @@ def nudged_box() -> TrajectoryCase:
         "a friction force that is constant over a step can reverse the motion and drive the box across the floor",
         "the box stops where Coulomb's law predicts and stays there",
         f"Coulomb's law in closed form: the box slides by v²/(2 μ g) = {1e3 * way:.4g} mm",
-        _boxes("nudged_box", "A nudged box", 1, BOX, 0.0, speed),
+        scene_named("nudged_box"),
         measure,
         _ENGINE,
     )
 
 
-def on_a_slope(
-    title: str, name: str, count: int, sort: tuple[float, float, float]
-) -> TrajectoryCase:
-    """Boxes on one another on a slope of 20 degrees, for ten seconds."""
-    slope = math.radians(20.0)
-    leans = _lean(count, sort, slope)
+def on_a_slope(name: str) -> TrajectoryCase:
+    """Boxes of 1 kg on one another on a slope of 20 degrees, for ten seconds.
+
+    The slabs of a stack oscillate on their springs without slipping.
+    """
+    scene = scene_named(name)
+    count = len(scene.bodies)
+    leans = _lean(scene, math.radians(20.0))
 
     def measure(run: Run) -> Measured:
         """Measure the distance of the upper box from its elastic deflection at the end, relative to
@@ -110,18 +75,18 @@ def on_a_slope(
         return Measured(largest_gain(run), NO_GAIN, off / leans, _SECOND_ORDER * count)
 
     return TrajectoryCase(
-        title,
+        scene.title,
         "Coulomb's law; springs of (5)",
         "a sticking contact must not creep; lever arms couple normal and friction forces",
         f"the {'upper ' * (count > 1)}box moves by {1e6 * leans:.3g} μm as the contact springs deflect, then stays",
         "no contact slips, because tan 20° < μ; force and moment deflect the contact springs between two faces",
-        _boxes(name, title, count, sort, slope, 0.0),
+        scene,
         measure,
         _ENGINE,
     )
 
 
-def _lean(count: int, sort: tuple[float, float, float], slope: float) -> float:
+def _lean(scene: Any, slope: float) -> float:
     """Return the elastic displacement of the upper box's centre down the slope [m], to first order,
     without slip.
 
@@ -129,7 +94,9 @@ def _lean(count: int, sort: tuple[float, float, float], slope: float) -> float:
     this moment divided by K w² / 2. The centre of the upper box is (n − 1 − k) h + h / 2 above the
     face.
     """
-    width, height, stiffness = sort
+    count = len(scene.bodies)
+    width, height = scene.bodies[0].shapes[0].size
+    stiffness = scene.contact.stiffness
     turns = [
         _G * math.sin(slope) * height * (count - k) ** 2 / (stiffness * width**2)
         for k in range(count)
