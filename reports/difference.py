@@ -13,6 +13,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import compress
+from os.path import commonprefix
 from typing import Any
 
 from reports.numbers_file import ReportNumbers
@@ -145,15 +146,18 @@ def _cells(table: str, old: Table, new: Table, tolerance: float) -> Iterator[Cel
         first = old_rows.get(row, {})
         second = new_rows.get(row, {})
         for column in dict.fromkeys((*first, *second)):
-            gap = 0.0
-            by_time = timed_rows
+            pair = first.get(column), second.get(column)
             if column in first and column in second:
-                state, gap = compare_values(first[column], second[column], tolerance)
-                by_time = column in timed or LEFT_OUT in (first[column], second[column])
+                state, gap = compare_values(*pair, tolerance)
+                by_time = column in timed or LEFT_OUT in pair
             else:
-                state = ONLY_OLD if column in first else ONLY_NEW
-            state = TIMING if by_time else PROSE if column in prose and state == DIFFERS else state
-            yield Cell(table, column, row, first.get(column), second.get(column), state, gap)
+                state, gap = (ONLY_OLD if column in first else ONLY_NEW), 0.0
+                by_time = timed_rows
+            if by_time:
+                state = TIMING
+            elif state == DIFFERS and column in prose:
+                state = PROSE
+            yield Cell(table, column, row, *pair, state, gap)
 
 
 def _names(table: Table, timed_rows: bool) -> list[str]:
@@ -178,25 +182,19 @@ def _distinct(names: Sequence[str]) -> list[str]:
 def compare_values(old: Any, new: Any, tolerance: float) -> tuple[str, float]:
     """Return the state of a comparison of two cells, and their relative difference; texts must be
     equal."""
-    if isinstance(old, bool) == isinstance(new, bool) and (
-        old == new or (old != old and new != new)
-    ):  # NaN is NaN
+    same = old == new or (old != old and new != new)  # NaN is NaN
+    if same and isinstance(old, bool) == isinstance(new, bool):
         return EXACT, 0.0
     if old is None or new is None:
         return (ONLY_NEW if old is None else ONLY_OLD), 0.0
-    if not all(
-        isinstance(value, int | float) and not isinstance(value, bool) for value in (old, new)
-    ):
+    numbers = isinstance(old, int | float) and isinstance(new, int | float)
+    if not numbers or isinstance(old, bool) or isinstance(new, bool):
         return DIFFERS, math.inf
     largest = max(abs(old), abs(new))
+    if not math.isfinite(largest):
+        return DIFFERS, math.inf
     apart = abs(old - new)
-    gap = (
-        math.inf
-        if not math.isfinite(largest)
-        else 0.0
-        if apart <= ROUNDING
-        else float(apart / largest)
-    )
+    gap = float(apart / largest) if apart > ROUNDING else 0.0
     return (CLOSE if gap <= tolerance else DIFFERS), gap
 
 
@@ -236,10 +234,9 @@ def lines(found: Difference) -> Iterator[str]:
     for cell in found.of(DIFFERS)[:SHOWN]:
         old = str(cell.old)
         new = str(cell.new)
-        parted = next((i for i, (a, b) in enumerate(zip(old, new, strict=False)) if a != b), 0)
-        start = (
-            max(0, parted - 8) if max(len(old), len(new)) > _WIDEST else 0
-        )  # shortly before they differ
+        start = 0
+        if max(len(old), len(new)) > _WIDEST:  # shortly before they differ
+            start = max(0, len(commonprefix([old, new])) - 8)
         share = f" ({cell.gap:.1e} of it)" if math.isfinite(cell.gap) else ""
         yield (
             f"{cell.table}, row {_short(cell.row)}, {_short(cell.column)}: {_short(old[start:])} "

@@ -500,37 +500,54 @@ print(twice_energy(v_plus) - twice_energy(v_minus))  # above 0: the impact gaine
 """
 
 
-def _contacts(run: Any, silent: bool) -> tuple[float, float]:
-    """Return `Certificate.span` and `Certificate.restitution`; NaN for one that the record cannot
-    decide."""
-    table = run.contacts
-    impacts = run.impacts
-    scene = scene_from_values(run.scene_resolved)
-    if silent or not len(impacts.step):
-        return np.nan, np.nan
-    mechanism = mechanism_of(scene)
-    rubbing = run.law_settings.get("friction_in_impacts") and scene.largest_friction > 0
-    if rubbing or scene.contact.self_collision_rows == "per_body":
-        return np.nan, np.nan
-    values = system_of(scene).restitutions
-    equality = len(values) == 1 and not run.law_settings.get("pushing")
-    # contacts are recorded at one moment: steps with impacts at different ones are not judged
+class _Struck(NamedTuple):
+    """The k steps whose impacts happened at one moment: that at which their contacts are recorded.
+
+    first, last : (k,) the first and the last impact of each step
+    whole : (k,) whether restitution is asked of v⁺: no impact was scaled, and none moved a
+        coordinate that another one moves again
+    """
+
+    steps: Integers
+    first: Integers
+    last: Integers
+    whole: NDArray[np.bool_]
+
+
+def _struck_at_once(impacts: Any, poisson: bool) -> _Struck:
+    """Return the steps that are judged; by Poisson's law, those of a single contact."""
     _, first, line = np.unique(impacts.step, return_index=True, return_inverse=True)
     moved = np.bincount(line, (impacts.q != impacts.q[first[line]]).any(axis=1)) > 0.0
     chosen = np.flatnonzero(~moved[line])
     step = impacts.step[chosen]
-    places = impacts.q[chosen]
-    scales = impacts.scale[chosen]
-    if not len(step):
-        return np.nan, np.nan
     steps, first, line = np.unique(step, return_index=True, return_inverse=True)
     last = len(line) - 1 - np.unique(step[::-1], return_index=True)[1]
-    # no impact of the step was scaled, and none moved a coordinate that another one moves again
     times_moved = np.zeros((len(steps), impacts.v_plus.shape[1]))
     np.add.at(times_moved, line, (impacts.v_plus != impacts.v_minus)[chosen])
-    whole = (np.bincount(line, scales != 1.0) == 0.0) & (times_moved <= 1.0).all(axis=1)
-    if scene.contact.forces == "implicit":  # there, several contacts collide by Poisson's law
-        whole &= np.bincount(line, impacts.rows[chosen] > 1) == 0.0
+    spoilt = impacts.scale[chosen] != 1.0
+    if poisson:
+        spoilt |= impacts.rows[chosen] > 1
+    whole = (np.bincount(line, spoilt) == 0.0) & (times_moved <= 1.0).all(axis=1)
+    return _Struck(steps, chosen[first], chosen[last], whole)
+
+
+def _contacts(run: Any, silent: bool) -> tuple[float, float]:
+    """Return `Certificate.span` and `Certificate.restitution`; NaN for one that the record cannot
+    decide."""
+    impacts = run.impacts
+    scene = scene_from_values(run.scene_resolved)
+    rubbing = run.law_settings.get("friction_in_impacts") and scene.largest_friction > 0
+    if silent or rubbing or scene.contact.self_collision_rows == "per_body":
+        return np.nan, np.nan
+    if not len(impacts.step):
+        return np.nan, np.nan
+    steps, first, last, whole = _struck_at_once(impacts, scene.contact.forces == "implicit")
+    if not len(steps):
+        return np.nan, np.nan
+    mechanism = mechanism_of(scene)
+    values = system_of(scene).restitutions
+    equality = len(values) == 1 and not run.law_settings.get("pushing")
+    table = run.contacts
     step_of = np.repeat(np.arange(len(run.impulse)), np.diff(table.offsets))
     struck = np.flatnonzero((table.impulse != 0.0) & np.isin(step_of, steps))
     difference = -run.impulse[steps]
@@ -538,24 +555,20 @@ def _contacts(run: Any, silent: bool) -> tuple[float, float]:
     residual = 0.0
     for start in range(0, len(struck), _BATCH):
         m = struck[start : start + _BATCH]
-        # (11), (12): nᵀ(J_a − J_b)
         k = np.searchsorted(steps, step_of[m])
-        normal = table.normal[m]
         rows_a, rows_b = (
-            mechanism.rows_along(places[first[k]], body[m], table.point[m], normal)
+            mechanism.rows_along(impacts.q[first[k]], body[m], table.point[m], table.normal[m])
             for body in (table.body_a, table.body_b)
         )
-        rows = rows_a - rows_b
+        rows = rows_a - rows_b  # (11), (12): nᵀ(J_a − J_b)
         pushed = rows * table.impulse[m][:, None]
         np.add.at(difference, k, pushed)
         np.add.at(size, k, np.abs(pushed))
         if equality:
-            before = impacts.v_minus[chosen[first[k]]]
-            after = impacts.v_plus[chosen[last[k]]]
-            off = np.abs(
-                (rows * after).sum(axis=1) + float(values[0]) * (rows * before).sum(axis=1)
-            )
-            felt = np.abs(rows * before).sum(axis=1)
+            before = rows * impacts.v_minus[first[k]]
+            after = rows * impacts.v_plus[last[k]]
+            off = np.abs(after.sum(axis=1) + float(values[0]) * before.sum(axis=1))
+            felt = np.abs(before).sum(axis=1)
             residual = max(residual, _largest_share(off[whole[k]], felt[whole[k]]))
     span = _largest_share(np.abs(difference).sum(axis=1), size.sum(axis=1))
     return span, residual if equality and whole.any() else np.nan

@@ -95,31 +95,31 @@ def confirmed(trials: Table, fresh: Callable[[Region], Table] | None) -> Region 
     If the other half contradicts the region, both halves are searched; then only fresh trials can
     confirm a region.
     """
-    first = np.zeros(len(trials.rows), np.bool_)
-    first[np.random.default_rng(SPLIT_SEED).permutation(len(trials.rows))[::2]] = True
-    region = search_region(trials.only(first))
+    searched = np.zeros(len(trials.rows), np.bool_)
+    searched[np.random.default_rng(SPLIT_SEED).permutation(len(trials.rows))[::2]] = True
+    region = search_region(trials.only(searched))
     if region is None and fresh is None:  # all of this half may hold: search the other
-        first = ~first
-        region = search_region(trials.only(first))
-    inside = trials.only(
-        not searched and region is not None and region.contains(row)
-        for searched, row in zip(first, trials.records(), strict=True)
-    )
-    if region is None or False in inside.holds:
-        if fresh is None:
+        searched = ~searched
+        region = search_region(trials.only(searched))
+    others = None if region is None else _held_inside(region, trials.only(~searched))
+    if fresh is None:
+        if region is None or others is None or others < LEAST_CONFIRMING:
             return None
+        return replace(region, others=others)
+    if others is None:
         region = search_region(trials)
-        inside = trials.only(())
     if region is None:
         return None
-    drawn = fresh(region) if fresh else inside.only(())
-    if False in drawn.holds:
+    drawn = fresh(region).holds
+    if False in drawn or drawn.count(True) < LEAST_CONFIRMING:
         return None
-    others = inside.holds.count(True)
-    new = drawn.holds.count(True)
-    if (new if fresh else others) < LEAST_CONFIRMING:
-        return None
-    return replace(region, others=others, fresh=new)
+    return replace(region, others=others or 0, fresh=drawn.count(True))
+
+
+def _held_inside(region: Region, trials: Table) -> int | None:
+    """Return in how many trials inside the region the claim holds; None if it fails in one."""
+    inside = trials.only(region.contains(row) for row in trials.records()).holds
+    return None if False in inside else inside.count(True)
 
 
 def search_region(trials: Table) -> Region | None:
