@@ -6,22 +6,20 @@ The hand moves the device along the first coordinates of the tool; the others st
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from iapb.scene import Scene, find_scene, load_scene, scene_from_text
+from iapb.scene import Scene, find_scene, load_scene
 from iapb.simulation import Simulation
 from reference import Floats
 from reference.worlds import find_world
 
-COORDINATION = (100.0, 70.0)  # Table I: K_coord [N/m], B_coord [N s/m]
 COUPLER_WORLD = "CBuc"
-RADIUS = 0.01  # [m] of the tool of `wall_scene`
-CLEARANCE = 1e-3  # [m] between that tool and the wall, at the start
+RADIUS = 0.01  # [m] of the tool in wall.yaml
 
 
 @dataclass
@@ -79,37 +77,15 @@ def wall_scene(
     rate: float = 512.0,
     limit: float | None = None,
 ) -> Scene:
-    """Return a disc that slides along x to a wall at x = 0, with e = 0 and the gains of Table I.
+    """Return the scene of wall.yaml: a disc that slides along x to a wall at x = 0, with e = 0.
 
     stiffness, damping : of the coupler in CBuc, else of the wall; limit : of the device's force [N].
     """
-    own = [stiffness, damping]
-    wall = {"stiffness": stiffness, "damping": damping} if world != COUPLER_WORLD else {}
-    tool = {
-        "name": "tool",
-        "joint": "prismatic",
-        "axis": [1, 0],
-        "mass": 2.0,
-        "shapes": [{"kind": "circle", "radius": RADIUS}],
-        "position": [-RADIUS - CLEARANCE],
-    }
-    return scene_from_text(
-        json.dumps(
-            {
-                "name": "device_loop",
-                "rate": rate,
-                "duration": 1.0,
-                "bodies": [tool],
-                "walls": [
-                    {"name": "wall", "kind": "half_plane", "point": [0, 0], "normal": [-1, 0]}
-                ],
-                "contact": {"forces": "paper", "restitution": 0.0, **wall},
-                "device": {} if limit is None else {"force_limit": [limit]},
-                "couplings": {
-                    "four_channel": {"stiffness": COORDINATION[:1], "damping": COORDINATION[1:]},
-                    "unilateral": {"stiffness": own[:1], "damping": own[1:]},
-                },
-                "hand": {"body": "tool", "force": [0, 0, 0]},
-            }
-        )
-    )
+    gains = "couplings.unilateral" if world == COUPLER_WORLD else "contact"
+    values: dict[str, Any] = {f"{gains}.stiffness": stiffness, f"{gains}.damping": damping}
+    if world == COUPLER_WORLD:
+        values = {name: [value] for name, value in values.items()}
+    if limit is not None:
+        values["device.force_limit"] = [limit]
+    scene = load_scene(Path(__file__).with_name("wall.yaml"))
+    return scene.with_values(values | {"rate": rate})
