@@ -28,7 +28,7 @@ values:
   duration: [0.06]
   bodies.striker.position.0: [-0.06]
   contact.restitution: [0, 1]
-  bodies.striker.velocity.1: [-0.1, 0, 0.1]
+  bodies.striker.velocity.1: [-0.1, 0.1]
 """
 ROOT = Path(__file__).parents[2]
 
@@ -59,8 +59,8 @@ def runs(folder):
 
 def test_the_table_has_an_axis_for_each_path_and_says_what_its_runs_say(done):
     found = table(done)
-    assert found.energy_lost.dims[0] == "world" and found.energy_lost.shape == (2, 1, 1, 2, 3)
-    assert len(runs(done)) == 12 and not found.error.any()
+    assert found.energy_lost.dims[0] == "world" and found.energy_lost.shape == (2, 1, 1, 2, 2)
+    assert len(runs(done)) == 8 and not found.error.any()
     assert found.energy_lost.attrs["units"] == "J"
     struck = found.sel({"world": "IAPB", "bodies.striker.velocity.1": 0.1})
     elastic, plastic = (struck.sel({"contact.restitution": e}) for e in (1.0, 0.0))
@@ -77,7 +77,7 @@ def test_a_point_that_has_a_file_is_not_simulated_again_and_a_missing_one_is(don
     lost.unlink()
     assert (
         sweep(done) == 0
-        and "12 points, 1 of them simulated now, 0 failed" in capsys.readouterr().out
+        and "8 points, 1 of them simulated now, 0 failed" in capsys.readouterr().out
     )
     after = runs(done)
     assert {name for name in before if after[name] != before[name]} == {lost.name}
@@ -118,7 +118,7 @@ def test_a_killed_sweep_keeps_its_finished_points_and_continues(done, tmp_path, 
     child.send_signal(kill)
     assert child.wait(60) == (130 if kill == signal.SIGINT else -kill)
     kept = runs(tmp_path)
-    assert 1 <= len(kept) < 12 and not (tmp_path / "small" / "points.nc").exists()
+    assert 1 <= len(kept) < 8 and not (tmp_path / "small" / "points.nc").exists()
     assert sweep(tmp_path) == 0
     assert kept.items() <= runs(tmp_path).items() and table(tmp_path).equals(table(done))
 
@@ -196,7 +196,7 @@ def test_a_worker_of_another_version_or_without_the_folder_says_so(tmp_path):
     [
         ("worlds:", "worldsx:", "worldsx"),
         ("[0, 1]", "[[0, 1]]", "contact.restitution"),
-        ("[0, 1]", f"[{'0, ' * 20_000} 1]", "at most"),
+        ("[0, 1]", f"[{'0, ' * 30_000} 1]", "at most"),
         ("two_discs", "../two_discs.yaml", "scene"),
         ("contact.restitution", "contact/restitution", "contact/restitution"),
     ],
