@@ -212,6 +212,7 @@ def test_json_has_the_keys_that_the_documents_list_and_an_error_is_an_object_too
     assert "not read" in rows["bad.lcp"] and rows["two.lcp"].count("solved") > 3
     assert "solved" not in rows["none.lcp"]  # no z has 0 <= z and -z - 1 >= 0
     assert found["verify"]["passed"] and len(found["verify"]["laws"]) == 1
+    assert "def test_" in found["verify-many"]["counterexamples"][0]["test"]
     assert found["port"]["broken_laws"] == ["bounded"] and Path(found["port"]["map"]).is_file()
     assert [one["verdict"] for one in found["prove"]["statements"]] == ["proved"]
     assert all(Path(each).is_file() for each in found["reproduce --figure"]["drawings"])

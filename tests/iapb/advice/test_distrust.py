@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 from iapb.advice.distrust import distrust_of
+from iapb.contact.geometry import SPHERE, Shape, make_shapes
+from iapb.contact.solids import solids_of
 from iapb.run import Run
 from iapb.scene import Scene, SpatialScene
 from iapb.simulation import simulate
@@ -364,3 +366,9 @@ def test_what_falls_through_a_gap_too_narrow_for_it_is_seen(
     assert (run.q[-1, 1] < -SIDE) == (friction == 0.0)
     assert [why for why in run.distrust if "narrower" in why and said not in why] == []
     assert any("narrower" in why for why in run.distrust) == bool(said)
+
+
+def test_a_ball_crosses_a_smaller_one_within_its_own_radius() -> None:
+    (small,) = solids_of(make_shapes([Shape(SPHERE, radius=0.005)], True)).values()
+    start = np.array([[0.0, 0.03, 0.1]])
+    assert small.crossed(start, start * [1, 1, -1], np.zeros(1), 0.04).all()

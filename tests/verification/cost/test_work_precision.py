@@ -5,35 +5,13 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import pytest
 
 from iapb import ArgumentError
 from reports.commands.bench import seconds_of
 from verification import which_method
 from verification.cost import accuracy as study
-from verification.cost.calls import daqp_call
-from verification.impacts import ImpactCase, timed_problems
 from verification.table import Table
-
-PROBLEMS = [
-    problem for size in ((1, 3), (4, 3), (20, 6), (60, 12)) for problem in timed_problems(*size)
-]
-
-
-@pytest.mark.parametrize("problem", PROBLEMS, ids=lambda problem: problem.label)
-def test_daqp_solves_every_hard_impact_of_equalities(problem: ImpactCase) -> None:
-    """Equalities and complementarity have one answer, and no rival fails because of the tolerance
-    that we give it."""
-    J = problem.contact_jacobian
-    v = problem.velocity
-    truth = np.array([float(x) for x in problem.truth])
-    assert (
-        np.abs(J @ truth + problem.restitution * (J @ v)).max()
-        <= 1e-12 * np.abs(J).max() * np.abs(v).max()
-    )
-    for _ in range(2):
-        assert problem.distance(daqp_call(problem)(), truth) <= 1e-5
 
 
 @pytest.fixture(scope="module")
