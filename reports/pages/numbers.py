@@ -86,24 +86,24 @@ def num(value: float, digits: int = 2) -> str:
 
 
 @_of_numbers
-def percent(share: float, digits: int = 2) -> str:
+def percent(share: float) -> str:
     """Return a share as "13 %"."""
-    return f"{format_number(100.0 * share, digits)}{NARROW}%"
+    return f"{format_number(100.0 * share, 2)}{NARROW}%"
 
 
 @_of_numbers
-def times(ratio: float, digits: int = 2) -> str:
+def times(ratio: float) -> str:
     """Return a ratio as "11×"."""
-    return f"{format_number(ratio, digits)}×"
+    return f"{format_number(ratio, 2)}×"
 
 
 @_of_numbers
-def time(microseconds: float, digits: int = 3) -> str:
+def time(microseconds: float) -> str:
     """Return a time given in µs: in µs below 1 ms, in ms below 1 s, else in s."""
     for unit, factor in (("µs", 1.0), ("ms", 1e3)):
         if abs(microseconds) < 1e3 * factor:
-            return f"{format_cell(microseconds / factor, digits)}{NARROW}{unit}"
-    return f"{format_cell(microseconds / 1e6, digits)}{NARROW}s"
+            return f"{format_cell(microseconds / factor, 3)}{NARROW}{unit}"
+    return f"{format_cell(microseconds / 1e6, 3)}{NARROW}s"
 
 
 def place(value: float, most: float) -> str:

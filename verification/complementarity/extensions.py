@@ -67,11 +67,6 @@ def _gain(impact: ImpactCase, v_plus: Floats) -> float:
     return (_form(impact, v_plus) - before) / before
 
 
-def _distance(impact: ImpactCase, first: Floats, second: Floats) -> float:
-    """Return the distance of two velocities in the kinetic metric, relative to |v⁻|."""
-    return float(np.sqrt(_form(impact, first - second) / _form(impact, impact.velocity)))
-
-
 def with_friction(study: Study, case: tuple[float, float], seed: int = 44) -> Row:
     """Compare the engine's frictional impact with Coulomb's NCP and CCP on random impacts with one
     e and one μ."""
@@ -96,7 +91,7 @@ def with_friction(study: Study, case: tuple[float, float], seed: int = 44) -> Ro
         if ncp is None or ours.status not in ("complete", "scaled"):
             unsolved += 1
             continue
-        distances.append(_distance(impact, ours.velocity, ncp))
+        distances.append(impact.distance(ours.velocity, ncp))
         without = resolve_impact(mass, rows, v, e).impulses
         if (
             ours.friction_share == 1.0 and min(ours.impulses.min(), without.min()) >= 0.0
@@ -167,7 +162,7 @@ def with_unequal(study: Study, signs: str, seed: int = 45) -> Row:
         ours = resolve_impact(*impact.arrays, e)
         problem = ImpactProblem.from_impact(*impact.arrays, e)
         if len(set(e)) > 1:
-            distances.append(_distance(impact, ours.velocity, poisson(problem).velocity))
+            distances.append(impact.distance(ours.velocity, poisson(problem).velocity))
         gains[k] = [
             2.0 * ours.energy_change / _form(impact, impact.velocity),
             *(_gain(impact, law(problem).velocity) for law in (newton_lcp, newton_equality)),
