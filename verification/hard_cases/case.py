@@ -190,15 +190,15 @@ AnyCase = HardCase | TrajectoryCase
 
 
 @cache
-def _scenes() -> dict[str, dict[str, Any]]:
-    path = Path(__file__).with_name("scenes.yaml")
-    found: dict[str, dict[str, Any]] = YAML(typ="safe").load(path)
+def written(file: str) -> dict[str, dict[str, Any]]:
+    """Return the impacts or scenes of a file beside this module, by name."""
+    found: dict[str, dict[str, Any]] = YAML(typ="safe").load(Path(__file__).with_name(file))
     return found
 
 
 def scene_named(name: str) -> Scene:
     """Return a scene of scenes.yaml."""
-    return scene_from_text(json.dumps(_scenes()[name]))
+    return scene_from_text(json.dumps(written("scenes.yaml")[name]))
 
 
 def largest_gain(run: Run) -> float:

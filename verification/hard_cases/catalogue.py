@@ -5,28 +5,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from fractions import Fraction
-from functools import cache, partial
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 import numpy as np
-from ruamel.yaml import YAML
 
 from verification.hard_cases import friction, motions, numerical, sticking
-from verification.hard_cases.case import AnyCase, FrictionalCase, HardCase
-
-
-@cache
-def _written() -> dict[str, dict[str, Any]]:
-    found: dict[str, dict[str, Any]] = YAML(typ="safe").load(
-        Path(__file__).with_name("impacts.yaml")
-    )
-    return found
+from verification.hard_cases.case import AnyCase, FrictionalCase, HardCase, written
 
 
 def written_case(name: str) -> HardCase:
     """Return an impact of impacts.yaml."""
-    given = _written()[name]
+    given = written("impacts.yaml")[name]
     arrays = {
         key: np.array(given[key], dtype=object) for key in ("M", "J", "v", "e", "T") if key in given
     }
