@@ -136,7 +136,7 @@ class Start:
         margin = math.inf
         if len(self.system.pairs) > MANY_PAIRS:
             extents = self.system.thickness
-            margin = float(extents[np.isfinite(extents)].max(initial=0.0))
+            margin = extents[np.isfinite(extents)].max(initial=0.0)
         placed = self.mechanism.placements(self.q)
         stops = self.stops
         found = self.system.finder.find(*placed, margin)
@@ -213,7 +213,7 @@ class Start:
 
     def mobility(self, rows: Floats) -> float:
         """Largest eigenvalue of J M⁻¹ Jᵀ [1/kg]."""
-        return float(np.linalg.eigvalsh(rows @ self.moved(rows))[-1]) if len(rows) else 0.0
+        return np.linalg.eigvalsh(rows @ self.moved(rows))[-1] if len(rows) else 0.0
 
     def applied(self, q: Floats) -> Floats:
         """Generalized force (d,) at q of gravity and of the hand's force at t = 0."""
@@ -323,7 +323,7 @@ class Start:
                 break
             pushing &= force > 0.0  # a contact that would pull carries nothing
         hand = self.scene.hand.largest_force() if self.scene.hand is not None else 0.0
-        weights = float(np.linalg.norm(self.system.gravity) * self.mechanism.arrays.mass.sum())
+        weights = np.linalg.norm(self.system.gravity) * self.mechanism.arrays.mass.sum()
         # wedges and levers can give more, but less in other poses
         return np.clip(force, 0.0, weights + hand)
 
@@ -470,7 +470,7 @@ def _inertias(start: Start) -> Iterator[Caution]:
         if body.joint in ("planar", "free_flyer") and body.parent == WORLD and body.shapes:
             filled = filled_with(body.shapes, 1.0)
             largest = np.linalg.norm(np.atleast_2d(filled["inertia"]), 2)
-            times = float(high / (largest * body.mass / filled["mass"]))
+            times = high / (largest * body.mass / filled["mass"])
             if not 1.0 / STRANGE < times < STRANGE:
                 says = f" is {times:.2g} times that of its shapes with its mass: is the unit kg m2?"
                 yield _about(start.scene, "inertia", ("bodies", i, "inertia"), says)
@@ -485,8 +485,8 @@ def _overlaps(start: Start) -> Iterator[Caution]:
         resting[rows] = start.loads(rows)
     for rows in start.by_pair:
         i = int(rows[0])
-        depth = -float(found.gap[i])
-        if depth <= 0.0 or not _too_deep(start, rows, float(resting[rows].max())):
+        depth = -found.gap[i]
+        if depth <= 0.0 or not _too_deep(start, rows, resting[rows].max()):
             continue
         if found.body_b[i] < 0:
             sides.setdefault(int(found.body_a[i]), []).append(i)
@@ -502,7 +502,7 @@ def _overlaps(start: Start) -> Iterator[Caution]:
                 a, b, c = (
                     start.labels[s] for s in (found.shape_a[i], found.shape_b[i], found.shape_b[j])
                 )
-                narrower = in_metres(-float(found.gap[i] + found.gap[j]))
+                narrower = in_metres(-found.gap[i] - found.gap[j])
                 yield Caution(
                     "wedged",
                     f"{a}, {b}, {c}",
@@ -516,12 +516,12 @@ def _too_deep(start: Start, rows: Rows, resting: float) -> bool:
     springs' energy."""
     gap = np.minimum(start.found.gap[rows], 0.0)
     J = start.rows[rows]
-    depth = -float(gap.min())
-    size = float(start.thickness[rows[0]])
+    depth = -gap.min()
+    size = start.thickness[rows[0]]
     K = start.scene.contact.gains[0]
     if depth * K <= 2.0 * resting and K > 0.0:
         return False
-    mass = 1.0 / max(float(np.max(np.sum(J * start.moved(J).T, axis=1))), 1e-300)
+    mass = 1.0 / max(np.max(np.sum(J * start.moved(J).T, axis=1)), 1e-300)
     kinetic = 0.5 * mass * np.abs(J @ start.v).max() ** 2
     weight = mass * np.abs(start.pull[rows]).max()
     usual = max(
@@ -538,8 +538,8 @@ def _fast(start: Start, at_touch: bool, coupled: bool) -> Iterator[Caution]:
     """
     held = at_touch and coupled and start.scene.is_coupled
     for i in (int(rows[0]) for rows in start.by_pair):
-        time, speed = (float(x[i]) for x in start.meeting)
-        size = float(start.thickness[i])
+        time, speed = (x[i] for x in start.meeting)
+        size = start.thickness[i]
         leaving = start.rows[i] @ start.v >= 0.0 and start.pull[i] >= 0.0
         searched = at_touch and not (held and start.rows[i, start.tool].any())
         most = (0.5 * MOST_SAMPLES if searched else 0.5) * size
@@ -589,15 +589,15 @@ def _sags(start: Start) -> Iterator[Caution]:
     found = [(0.0, -1)]
     for rows in start.supports:
         shares = start.loads(rows) / (K * start.thickness[rows])
-        found.append((float(shares.max()), int(rows[shares.argmax()])))
+        found.append((shares.max(), int(rows[shares.argmax()])))
     touching = {int(i) for rows in start.touching for i in rows}
     for k, i in enumerate(range(start.first_stop, len(start.rows))):
         if i not in touching:
             # the joint is at its limit, and those behind it are fixed
             there = start.q.copy()
             there[stops.coordinate[k]] = stops.bound[k]
-            load = -float(stops.sign[k] * start.applied(there)[stops.dof[k]] / stops.arm[k])
-            found.append((load / (K * float(start.thickness[i])), i))
+            load = -(stops.sign[k] * start.applied(there)[stops.dof[k]] / stops.arm[k])
+            found.append((load / (K * start.thickness[i]), i))
     share, i = max(found)
     if share <= SAG:
         return
@@ -712,7 +712,7 @@ def _limit(loop: HapticLoop) -> str:
     """Return the limit that a loop breaks, where a closed form says it."""
     if loop.delay:
         return f", with a delay of {counted(loop.delay, 'step')} each way"
-    share = float((2.0 * loop.damping * loop.dt * np.diag(np.linalg.inv(loop.mass))).max())
+    share = (2.0 * loop.damping * loop.dt * np.diag(np.linalg.inv(loop.mass))).max()
     return f", for B Δt/(m/2) = {share:.3g} is above its limit 2" if share >= 2.0 else ""
 
 
@@ -743,7 +743,7 @@ def _loops(start: Start, coupling: str) -> dict[str, HapticLoop]:
     )
     K, B = contact.gains
     if contact.rigid:  # as `iapb.contact.kernels.implicit` chooses it
-        soft = float(start.mechanism.arrays.mass.sum()) / (COMPLIANCE * start.dt)
+        soft = start.mechanism.arrays.mass.sum() / (COMPLIANCE * start.dt)
         K = soft / ((1.0 + FADING) * start.dt)
         B = soft - K * start.dt
     loops = {"in free motion": free}

@@ -94,10 +94,10 @@ class _Seen:
     def trifle(self, bodies: Booleans) -> float:
         """Negligible energy [J] of some bodies: to lift each by a thousandth of its size; and
         rounding of the scene."""
-        rounding = 1e-14 * float(self.run.energy["kinetic"].max())
+        rounding = 1e-14 * self.run.energy["kinetic"].max()
         weights = np.linalg.norm(self.system.gravity) * self.mechanism.arrays.mass
         sizes = np.where(np.isinf(self.sizes), 0.0, self.sizes)[:-1]
-        return rounding + 1e-3 * float((weights * sizes)[bodies].sum())
+        return rounding + 1e-3 * (weights * sizes)[bodies].sum()
 
 
 # Energy and free motion
@@ -129,7 +129,7 @@ def _energy(seen: _Seen) -> Iterator[str]:
             )
             break
     for book in books:
-        most = float(book.friction.max())
+        most = book.friction.max()
         if not book.alone and not most <= book.most:
             yield f"friction drove {book.name or 'the bodies'}, by {most:.3g} J"
             break
@@ -195,7 +195,7 @@ def _alone(seen: _Seen, tree: int, energy: dict[str, Floats]) -> _Book:
     if steady:
         gain -= np.minimum.accumulate(np.minimum(gain, 0.0))
     taken = energy["penalty_work"], energy["friction_work"], -energy["impact_loss"]
-    at_hand = _at_hand(energy) + sum(float(work.max(initial=0.0)) for work in taken)
+    at_hand = _at_hand(energy) + sum(work.max(initial=0.0) for work in taken)
     most = (UNACCOUNTED if steady else SWING) * at_hand
     most += seen.trifle(seen.mechanism.tree_of_body == tree)
     return _Book(_first_body(seen, tree), energy["friction_work"], gain, at_hand, most, alone=True)
@@ -231,11 +231,11 @@ def _in_overlaps(seen: _Seen, gap: Floats, bodies: Booleans) -> float:
     A rigid contact lifts its bodies out of an overlap, no faster than the overlap fades.
     """
     if seen.scene.contact.stiffness is not None:
-        return 0.5 * seen.scene.contact.stiffness * float(np.sum(gap**2))
-    depth = -float(gap.min(initial=0.0))
-    mass = float(seen.mechanism.arrays.mass[bodies].sum())
+        return 0.5 * seen.scene.contact.stiffness * np.sum(gap**2)
+    depth = -gap.min(initial=0.0)
+    mass = seen.mechanism.arrays.mass[bodies].sum()
     speed = depth / (FADING * seen.run.dt)
-    gravity = float(np.linalg.norm(seen.system.gravity))
+    gravity = np.linalg.norm(seen.system.gravity)
     return mass * (0.5 * speed**2 + gravity * depth)
 
 
@@ -246,7 +246,7 @@ def _at_hand(energy: dict[str, Floats]) -> float:
     potential = energy["potential"]
     end = energy["kinetic"][-1] + potential[-1]
     start = end - sum(work[-1] for work in works) - _made_inside(energy)[-1]
-    return float(start - potential.min() + sum(np.abs(work).max() for work in works))
+    return start - potential.min() + sum(np.abs(work).max() for work in works)
 
 
 def _driven(seen: _Seen) -> Iterator[str]:
@@ -329,7 +329,7 @@ def _spun(seen: _Seen) -> Iterator[str]:
             changes = np.diff(moved, axis=0) - due
             changes[pushed[:, dofs].any(axis=1)] = 0.0
             drift = np.linalg.norm(np.cumsum(changes, axis=0), axis=1).max()
-            share = float(drift / (max(np.linalg.norm(moved, axis=1).max(), most) + SLOW))
+            share = drift / (max(np.linalg.norm(moved, axis=1).max(), most) + SLOW)
             if not share <= UNACCOUNTED:
                 yield f"the {what} of {body.name} changes by {100.0 * share:.3g} % although nothing touches it"
                 return
@@ -365,8 +365,8 @@ def _sank(seen: _Seen) -> Iterator[str]:
         limit = " (or the limit of its joint)" if seen.bodies[a].joint_limits else ""
         part = "all" if depth[i] >= thinner[i] else "more than half"
         yield (
-            f"{run.body_names[a]} and {other}{limit} overlap by {in_metres(float(depth[i]))} at "
-            f"{run.time[step]:.4g} s, {part} of {in_metres(float(thinner[i]))}"
+            f"{run.body_names[a]} and {other}{limit} overlap by {in_metres(depth[i])} at "
+            f"{run.time[step]:.4g} s, {part} of {in_metres(thinner[i])}"
         )
 
 
@@ -502,7 +502,7 @@ def _squeezed(seen: _Seen) -> Iterator[str]:
                 caught.append(step)
                 widest = max(widest, narrow)
         places = _places(run)[caught, b]
-        far = float(np.linalg.norm(places - places[:1], axis=1).max(initial=0.0))
+        far = np.linalg.norm(places - places[:1], axis=1).max(initial=0.0)
         if far > size:
             name = run.body_names[b]
             narrower = in_metres(widest)

@@ -126,11 +126,11 @@ _AT_FIRST = "energy at the start"
 def last_of(ledger: Mapping[str, Floats], before: Mapping[str, float] | None) -> dict[str, float]:
     """Return the sums at the end of a ledger, as the argument `before` for the steps that
     follow."""
-    first = {_AT_FIRST: float(ledger["kinetic"][0] + ledger["potential"][0])}
+    first = {_AT_FIRST: ledger["kinetic"][0] + ledger["potential"][0]}
     return (
         first
         | dict(before or {})
-        | {name: float(values[-1]) for name, values in ledger.items() if len(values)}
+        | {name: values[-1] for name, values in ledger.items() if len(values)}
     )
 
 
@@ -145,7 +145,7 @@ def lost_within(run: Run) -> Floats:
     the step."""
     impacts = run.impacts
     lost = np.zeros(run.steps)
-    step = impacts.step - round(float(run.time[0]) / run.dt)
+    step = impacts.step - round(run.time[0] / run.dt)
     np.add.at(lost, step, impacts.energy_lost)
     lost[np.setdiff1d(np.arange(run.steps), step[impacts.time > impacts.step * run.dt])] = np.nan
     return lost
