@@ -257,7 +257,7 @@ class Start:
         on a flat face; the closest pair first."""
         kept: dict[tuple[int, int], list[int]] = {}
         for i in np.argsort(self.found.gap, kind="stable").tolist():
-            pair = int(self.found.shape_a[i]), int(self.found.shape_b[i])
+            pair = self.found.shape_a[i], self.found.shape_b[i]
             kept.setdefault(pair, []).append(i)
         most = 4 if self.spatial else 2
         return [np.array(rows[:most]) for rows in kept.values()]
@@ -282,8 +282,8 @@ class Start:
         }
         falls: dict[int, Rows] = {}
         for rows in self.by_pair:
-            i = int(rows[0])
-            tree = int(self.tree_a[i])
+            i = rows[0]
+            tree = self.tree_a[i]
             # a linkage would change its pose
             free = np.count_nonzero(self.mechanism.tree_of_body == tree) == 1
             # not on one corner
@@ -330,7 +330,7 @@ class Start:
     def names(self, rows: Iterable[int]) -> str:
         """Return the names of the things in contact, such as "box and floor"; of more than two, the
         first three."""
-        shapes = [s for i in rows for s in (int(self.found.shape_a[i]), int(self.found.shape_b[i]))]
+        shapes = (s for i in rows for s in (self.found.shape_a[i], self.found.shape_b[i]))
         named = list(dict.fromkeys(self.labels[s] for s in shapes))
         if len(named) < 3:
             return " and ".join(named)
@@ -484,12 +484,12 @@ def _overlaps(start: Start) -> Iterator[Caution]:
     for rows in start.touching:
         resting[rows] = start.loads(rows)
     for rows in start.by_pair:
-        i = int(rows[0])
+        i = rows[0]
         depth = -found.gap[i]
         if depth <= 0.0 or not _too_deep(start, rows, resting[rows].max()):
             continue
         if found.body_b[i] < 0:
-            sides.setdefault(int(found.body_a[i]), []).append(i)
+            sides.setdefault(found.body_a[i], []).append(i)
         a, b = (start.labels[s] for s in (found.shape_a[i], found.shape_b[i]))
         out = ", ".join(f"{depth * x:.3g}" for x in found.normal[i][: 3 if start.spatial else 2])
         says = f"{a} starts {in_metres(depth)} inside {b}: move it by [{out}] m"
@@ -527,7 +527,7 @@ def _too_deep(start: Start, rows: Rows, resting: float) -> bool:
     usual = max(
         kinetic + weight * DEEP * size, 0.5 * mass * size**2
     )  # the latter: moving by its size in a second
-    return bool(depth > DEEP * size or depth > 1e-6 * size and 0.5 * K * np.sum(gap**2) > usual)
+    return depth > DEEP * size or depth > 1e-6 * size and 0.5 * K * np.sum(gap**2) > usual
 
 
 def _fast(start: Start, at_touch: bool, coupled: bool) -> Iterator[Caution]:
@@ -537,7 +537,7 @@ def _fast(start: Start, at_touch: bool, coupled: bool) -> Iterator[Caution]:
     tool with a coupling.
     """
     held = at_touch and coupled and start.scene.is_coupled
-    for i in (int(rows[0]) for rows in start.by_pair):
+    for i, *_ in start.by_pair:
         time, speed = (x[i] for x in start.meeting)
         size = start.thickness[i]
         leaving = start.rows[i] @ start.v >= 0.0 and start.pull[i] >= 0.0
@@ -589,8 +589,8 @@ def _sags(start: Start) -> Iterator[Caution]:
     found = [(0.0, -1)]
     for rows in start.supports:
         shares = start.loads(rows) / (K * start.thickness[rows])
-        found.append((shares.max(), int(rows[shares.argmax()])))
-    touching = {int(i) for rows in start.touching for i in rows}
+        found.append((shares.max(), rows[shares.argmax()]))
+    touching = {i for rows in start.touching for i in rows}
     for k, i in enumerate(range(start.first_stop, len(start.rows))):
         if i not in touching:
             # the joint is at its limit, and those behind it are fixed

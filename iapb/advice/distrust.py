@@ -119,7 +119,7 @@ def _energy(seen: _Seen) -> Iterator[str]:
     positive work."""
     books = list(_books(seen))
     for book in books:
-        k = int(np.argmax(book.excess))
+        k = np.argmax(book.excess)
         if not book.excess[k] <= book.most:  # it may be NaN
             whose = f"the energy of {book.name}" if book.name else "its energy"
             start = "start and the work of all forces" if book.alone else "start and work"
@@ -148,7 +148,7 @@ def _books(seen: _Seen) -> Iterator[_Book]:
         if start < stop and t != seen.carried
     }
     touching = np.stack([run.contacts.body_a, run.contacts.body_b])[:, run.contacts.body_b >= 0]
-    group = joined(int(trees[-1]) + 1, np.unique(trees[touching], axis=1).T)
+    group = joined(trees[-1] + 1, np.unique(trees[touching], axis=1).T)
     for number in np.unique(group):
         chosen = np.flatnonzero(group == number)
         members = [t for t in chosen.tolist() if t in ledgers]
@@ -164,7 +164,7 @@ def _books(seen: _Seen) -> Iterator[_Book]:
 
 
 def _first_body(seen: _Seen, tree: int) -> str:
-    return seen.run.body_names[int(np.argmax(seen.mechanism.tree_of_body == tree))]
+    return seen.run.body_names[np.argmax(seen.mechanism.tree_of_body == tree)]
 
 
 def _ledger(seen: _Seen, tree: int) -> dict[str, Floats]:
@@ -276,7 +276,7 @@ def _driven(seen: _Seen) -> Iterator[str]:
     # a real hand moves a real device, and its work is not known: so the device's energy counts, too
     at_hand = energy["kinetic"][0] + energy["device_kinetic"].max() + returned
     at_hand += np.ptp(energy["potential"]) + sum(np.abs(work).max() for work in ports)
-    k = int(np.argmax(given))
+    k = np.argmax(given)
     if not given[k] <= DRIVEN * at_hand + seen.trifle(seen.mechanism.tree_of_body >= 0):
         yield (
             f"the {run.coupling} coupling and its actuators gave tool and device {given[k]:.3g} J by "
@@ -287,14 +287,14 @@ def _driven(seen: _Seen) -> Iterator[str]:
 def _work(force: Floats, v: Floats, dt: float) -> Floats:
     """Return the work (n,) [J] of a force (n, d) in each step: by the mean velocity, it is a force's
     share of kinetic energy."""
-    return np.asarray(0.5 * dt * np.einsum("nd,nd->n", force, v[1:] + v[:-1]), np.float64)
+    return 0.5 * dt * np.einsum("nd,nd->n", force, v[1:] + v[:-1])
 
 
 def _rise(work: Floats) -> Floats:
     """Return how far the sum of the works (n,) of the steps has risen above its least value
     before."""
     total = np.cumsum(work)
-    return np.asarray(total - np.minimum.accumulate(np.minimum(total, 0.0)), np.float64)
+    return total - np.minimum.accumulate(np.minimum(total, 0.0))
 
 
 def _spun(seen: _Seen) -> Iterator[str]:
@@ -357,10 +357,10 @@ def _sank(seen: _Seen) -> Iterator[str]:
         most[rows] = np.minimum(most[rows], wall.thin)
     share = depth / most
     share[_landed(seen, np.flatnonzero((share > 1.0) & (depth < thinner)))] = 0.0
-    i = int(np.argmax(share))
+    i = np.argmax(share)
     if not share[i] <= 1.0:
-        step = int(np.searchsorted(table.offsets, i, "right")) - 1
-        a, b = int(table.body_a[i]), int(table.body_b[i])
+        step = np.searchsorted(table.offsets, i, "right") - 1
+        a, b = table.body_a[i], table.body_b[i]
         other = run.body_names[b] if b >= 0 else "a wall"
         limit = " (or the limit of its joint)" if seen.bodies[a].joint_limits else ""
         part = "all" if depth[i] >= thinner[i] else "more than half"
@@ -429,7 +429,7 @@ def _passed(seen: _Seen) -> Iterator[str]:
         k = np.flatnonzero((way > far) & (way >= apart))
         through = k[_crosses(run, one, other, k) | _crosses(run, other, one, k)]
         if len(through):
-            first = int(through[0])
+            first = through[0]
             said = f"{names[a]} passes through {names[b]}"
     if said:
         yield f"{said} in the step to {run.time[first + 1]:.4g} s"
@@ -518,7 +518,7 @@ def _overran(seen: _Seen) -> Iterator[str]:
     stops = seen.system.stops
     for i, (low, high) in zip(stops.coordinate[::2], stops.bound.reshape(-1, 2), strict=True):
         beyond = np.maximum(low - run.q[:, i], run.q[:, i] - high) / (high - low)
-        k = -1 if beyond[-1] > most else int(beyond.argmax())
+        k = -1 if beyond[-1] > most else beyond.argmax()
         if k == -1 or beyond[k] > DEEP:
             yield (
                 f"{run.coordinate_names[i]} is {run.q[k, i]:.3g} at {run.time[k]:.4g} s, beyond "

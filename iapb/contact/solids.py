@@ -30,7 +30,7 @@ class Solid(NamedTuple):
     @classmethod
     def of(cls, shapes: Shapes, i: int) -> Solid:
         """Return shape number i of a scene, which must not be endless."""
-        body = int(shapes.body[i])
+        body = shapes.body[i]
         radius = float(shapes.radius[i])
         rows = slice(shapes.first[i], shapes.first[i] + shapes.count[i])
         corners = np.pad(shapes.vertices[rows], ((0, 0), (0, 1)))
@@ -58,9 +58,7 @@ class Solid(NamedTuple):
         inside."""
         if self.radius > 0.0:
             return np.linalg.norm(points - self.points[0, : points.shape[1]], axis=1) - self.radius
-        return np.asarray(
-            (points @ self.normals[:, : points.shape[1]].T - self.offsets).max(axis=1)
-        )
+        return (points @ self.normals[:, : points.shape[1]].T - self.offsets).max(axis=1)
 
     def crossed(self, before: Floats, after: Floats, arc: Floats, radius: float) -> Booleans:
         """Whether straight paths enter and leave the shape's core, what is deeper than `GRAZED` and
@@ -81,7 +79,7 @@ class Solid(NamedTuple):
             share = np.clip(-(start * way).sum(axis=-1) / square, 0.0, 1.0)
             nearest = start + share[..., None] * way
             first, last, least = (np.linalg.norm(x, axis=-1) for x in (start, end, nearest))
-            return np.asarray((least < core) & (first >= core) & (last >= core))
+            return (least < core) & (first >= core) & (last >= core)
         before, after = (at @ self.normals.T - self.offsets for at in (before, after))
         before += arc[..., None]
         after += arc[..., None]
@@ -90,7 +88,7 @@ class Solid(NamedTuple):
         leaves = np.where((before <= 0.0) & (after > 0.0), share, 1.0).min(axis=-1)
         stays_out = ((before > 0.0) & (after > 0.0)).any(axis=-1)
         outside = (before.max(axis=-1) > 0.0) & (after.max(axis=-1) > 0.0)
-        return np.asarray(outside & ~stays_out & (leaves > enters))
+        return outside & ~stays_out & (leaves > enters)
 
 
 def solids_of(shapes: Shapes) -> dict[int, Solid]:
