@@ -112,7 +112,7 @@ class Start:
     def labels(self) -> list[str]:
         """Name of each shape, and of each joint limit."""
         names = mechanism.shape_names(self.scene)
-        for body, sign in zip(self.stops.body.tolist(), self.stops.sign, strict=True):
+        for body, sign in zip(self.stops.body, self.stops.sign, strict=True):
             side = "lower" if sign > 0.0 else "upper"
             names.append(f"the {side} limit of {self.scene.bodies[body].name}")
         return names
@@ -256,7 +256,7 @@ class Start:
         """Contacts of each pair of shapes, closest first: at most 4 in space and 2 in the plane, as
         on a flat face; the closest pair first."""
         kept: dict[tuple[int, int], list[int]] = {}
-        for i in np.argsort(self.found.gap, kind="stable").tolist():
+        for i in np.argsort(self.found.gap, kind="stable"):
             pair = self.found.shape_a[i], self.found.shape_b[i]
             kept.setdefault(pair, []).append(i)
         most = 4 if self.spatial else 2
@@ -271,7 +271,7 @@ class Start:
         )
         both = self.tree_a[near], self.tree_b[near]
         group = joined(len(self.mechanism.tree_dofs), zip(*both, strict=True))[both[0]]
-        return [near[group == one] for one in dict.fromkeys(group.tolist())]
+        return [near[group == one] for one in dict.fromkeys(group)]
 
     @cached_property
     def supports(self) -> list[Rows]:
@@ -460,9 +460,7 @@ def _inertias(start: Start) -> Iterator[Caution]:
     """Warn of moments of inertia that no body has: the largest one exceeds the sum of the others by
     a thousandth; and of those of a free body that its shapes do not have with its mass."""
     moments = np.linalg.eigvalsh(start.mechanism.arrays.inertia)
-    for i, (body, (low, middle, high)) in enumerate(
-        zip(start.scene.bodies, moments.tolist(), strict=True)
-    ):
+    for i, (body, (low, middle, high)) in enumerate(zip(start.scene.bodies, moments, strict=True)):
         if high > 1.001 * (low + middle):
             says = f": no body has a moment of {high:.3g} kg m2 beside {low:.3g} and {middle:.3g}"
             says += "; it is at most their sum"
@@ -617,7 +615,7 @@ def _overdriven_friction(start: Start) -> Iterator[Caution]:
         loads = start.friction[rows] * start.loads(rows) * start.dt / contact.friction_velocity
         slips = [
             math.sqrt(load) * row
-            for i, load in zip(rows.tolist(), loads.tolist(), strict=True)
+            for i, load in zip(rows, loads, strict=True)
             for row in start.slips(i)
         ]
         found = start.mobility(np.array(slips))

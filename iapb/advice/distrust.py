@@ -204,7 +204,7 @@ def _alone(seen: _Seen, tree: int, energy: dict[str, Floats]) -> _Book:
 def _balance(seen: _Seen, energy: dict[str, Floats], bodies: Booleans, name: str) -> _Book:
     """Return the book of bodies that nothing else touches but walls, hand and coupling."""
     contacts = seen.run.contacts
-    rows = slice(*contacts.offsets[:2].tolist())
+    rows = slice(*contacts.offsets[:2])
     gap = contacts.gap[rows][bodies[contacts.body_a[rows]]]
     springs = _in_overlaps(seen, np.minimum(gap, 0.0), bodies)
     at_hand = _at_hand(energy) + springs
@@ -384,7 +384,7 @@ def _landed(seen: _Seen, rows: Integers) -> Integers:
     step = np.searchsorted(table.offsets, np.arange(len(table.gap)), "right")
     pair = np.stack([step, table.body_a, table.body_b], axis=1)
     new = table.is_new & (table.gap >= LANDING * table.normal_velocity * seen.run.dt)
-    for row in rows.tolist():
+    for row in rows:
         fading = (
             (pair[before] + [1, 0, 0] == pair[row]).all()
             and table.gap[before] <= table.gap[row]
@@ -490,11 +490,11 @@ def _squeezed(seen: _Seen) -> Iterator[str]:
     fixed = table.body_b < 0
     # of two opposed contacts one has half of the overlap
     deep = fixed & (table.gap < -0.5 * NARROW * seen.sizes[table.body_a])
-    for b, size in enumerate(seen.sizes[:-1].tolist()):
+    for b, size in enumerate(seen.sizes[:-1]):
         own = fixed & (table.body_a == b)
         widest = 0.0
         caught = list[int]()
-        for step in np.unique(step_of[own & deep]).tolist():
+        for step in np.unique(step_of[own & deep]):
             rows = np.flatnonzero(own[slice(*table.offsets[step : step + 2])]) + table.offsets[step]
             facing = table.normal[rows] @ table.normal[rows].T < -0.9
             narrow = -np.add.outer(table.gap[rows], table.gap[rows])[facing].min(initial=0.0)
