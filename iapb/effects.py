@@ -69,7 +69,7 @@ class Question:
         body_a, body_b = self.system.shapes.body[self.system.pairs.T]
         tree = self.system.mechanism.tree_of_body
         moving = np.where(tree[body_a] == tree[body_b], "links", "others")
-        return Counter(np.where(body_b < 0, "walls", moving).tolist())
+        return Counter(np.where(body_b < 0, "walls", moving))
 
     @cached_property
     def frictions(self) -> list[float]:
@@ -95,7 +95,7 @@ class Question:
             felt |= mechanism.gravity(q, field) != 0.0
             q = mechanism.integrate(q, chance.uniform(-1.0, 1.0, mechanism.nv), 1.0)
         felt_by = mechanism.arrays.dof_body[: mechanism.nv][felt]
-        return [mechanism.names[b] for b in dict.fromkeys(felt_by.tolist())]
+        return [mechanism.names[b] for b in dict.fromkeys(felt_by)]
 
     @property
     def turning(self) -> str:

@@ -43,7 +43,7 @@ def collect_arrays(bodies: tuple[Body, ...], parents: list[int]) -> MechanismArr
         last_dof.append(last_dof[parent] if parent >= 0 else -1)
         if v_count[b]:
             dof_parent[v_start[b]] = last_dof[b]
-            last_dof[b] = int(v_start[b] + v_count[b] - 1)
+            last_dof[b] = v_start[b] + v_count[b] - 1
     dof_leader = np.arange(motions)
     dof_ratio = np.ones(motions)
     dof_offset = np.zeros(motions)
@@ -90,7 +90,7 @@ def _leader(bodies: tuple[Body, ...], name: str) -> int:
 def carriers(m: MechanismArrays) -> Integers:
     """Return the moving body that each body is fixed to, itself if it moves; -1 is the world."""
     found: list[int] = []
-    for b, parent in enumerate(m.parent.tolist()):
+    for b, parent in enumerate(m.parent):
         beneath = found[parent] if parent >= 0 else -1
         found.append(b if m.v_count[b] else beneath)
     return np.array(found, np.int64)
@@ -107,7 +107,7 @@ def moving_parts(m: MechanismArrays) -> MechanismArrays:
     carrier = carriers(m)
     placed: list[tuple[Floats, Floats]] = []  # joint frames in the frames of the parents' carriers
     own: list[tuple[Floats, Floats]] = []  # axes and origin of each body in its carrier's frame
-    for b, parent in enumerate(m.parent.tolist()):
+    for b, parent in enumerate(m.parent):
         rotation = m.placement_rotation[b]
         position = m.placement_position[b]
         if parent >= 0 and not moves[parent]:
@@ -126,7 +126,7 @@ def moving_parts(m: MechanismArrays) -> MechanismArrays:
     )
     for i, body in enumerate(moving):
         members = np.flatnonzero(carrier == body)
-        parts.mass[i] = mass = sum(m.mass[members].tolist())
+        parts.mass[i] = mass = sum(m.mass[members])
         places = np.array([own[b][1] + product(own[b][0], m.center_of_mass[b]) for b in members])
         if len(members) > 1 and mass > 0.0:
             parts.center_of_mass[i] = product(places.T, m.mass[members]) / mass
@@ -155,8 +155,7 @@ def point_inertia(place: Floats) -> Floats:
 def has_constant_mass_matrix(parts: MechanismArrays) -> bool:
     """Return True only if M of the moving parts does not depend on q."""
     return all(
-        _rotation_keeps_mass_matrix(parts, b)
-        for b in set(parts.dof_body[parts.dof_rotates].tolist())
+        _rotation_keeps_mass_matrix(parts, b) for b in set(parts.dof_body[parts.dof_rotates])
     )
 
 
@@ -165,7 +164,7 @@ def has_velocity_terms(parts: MechanismArrays, of: Container[int] | None = None)
     everywhere."""
     return not all(
         _rotation_keeps_mass_matrix(parts, b) and _spins_without_bias(parts, b)
-        for b in set(parts.dof_body[parts.dof_rotates].tolist())
+        for b in set(parts.dof_body[parts.dof_rotates])
         if of is None or b in of
     )
 
@@ -198,13 +197,13 @@ def _spins_without_bias(parts: MechanismArrays, b: int) -> bool:
     if parts.kind[b] != SPHERICAL:
         return True  # v = dq/dt: B follows from dM/dq alone
     inertia = parts.inertia[b] + parts.mass[b] * point_inertia(parts.center_of_mass[b])
-    return bool((inertia == inertia[0, 0] * np.eye(3)).all())
+    return (inertia == inertia[0, 0] * np.eye(3)).all()
 
 
 def make_free_motion(m: MechanismArrays, tree_of_body: Integers) -> FreeMotion:
     """Return the constants of `iapb.mechanics.kernels.free_motion` for the trees, given as the tree
     of each body."""
-    count = 1 + int(tree_of_body.max())
+    count = 1 + tree_of_body.max()
     found = FreeMotion(
         np.zeros(count, np.int64),
         np.full(count, -1, np.int64),
@@ -218,11 +217,11 @@ def make_free_motion(m: MechanismArrays, tree_of_body: Integers) -> FreeMotion:
     parts = moving_parts(m)
     carriers = np.flatnonzero(m.v_count)
     for t in range(count):
-        moving = np.flatnonzero(tree_of_body[carriers] == t).tolist()
-        if not moving:
+        moving = np.flatnonzero(tree_of_body[carriers] == t)
+        if not len(moving):
             continue
         first = moving[0]
-        kind = int(parts.kind[first])
+        kind = parts.kind[first]
         center = parts.center_of_mass[first]
         inertia = parts.inertia[first]
         found.root[t] = carriers[first]
@@ -239,8 +238,8 @@ def make_free_motion(m: MechanismArrays, tree_of_body: Integers) -> FreeMotion:
             if kind in (FREE_FLYER, PLANAR, SPHERICAL) and (parts.parent[moving[1:]] >= 0).all():
                 found.base[t] = parts.v_count[first]
     return found._replace(
-        turning=bool((found.kind != STRAIGHT).any()),
-        linked=bool((found.kind == LINKAGE).any()),
+        turning=(found.kind != STRAIGHT).any(),
+        linked=(found.kind == LINKAGE).any(),
     )
 
 
@@ -264,6 +263,6 @@ def principal_axes(inertia: Floats) -> tuple[Floats, Floats]:
             rows[i], rows[j] = c * rows[i] - s * rows[j], s * rows[i] + c * rows[j]
     order = sorted(range(3), key=lambda k: matrix[k, k])
     turned = np.ascontiguousarray(axes[:, order])
-    if float((np.cross(turned[:, 0], turned[:, 1]) * turned[:, 2]).sum()) < 0.0:
+    if (np.cross(turned[:, 0], turned[:, 1]) * turned[:, 2]).sum() < 0.0:
         turned[:, 2] *= -1.0
     return matrix[order, order], turned
