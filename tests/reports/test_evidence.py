@@ -18,7 +18,7 @@ import pytest
 import verification.claims
 from iapb.scene import find_scene, load_scene
 from reports.commands import reproduce
-from reports.evidence import depends, gather, runs, topics
+from reports.evidence import depends, energy, gather, runs, topics
 from reports.evidence import stage as stages
 from reports.evidence.stage import Stage
 from reports.evidence.topics import Plan
@@ -33,7 +33,11 @@ from reports.store.io import sealed
 from tests.reports.made_up import flipped
 from verification.claims import arm
 from verification.finding import NOT_COMPUTED, VERDICTS, Finding, Part, failure_of, finding_of
-from verification.table import Column, Table
+from verification.laws import bulk
+from verification.laws.topic import CAUGHT, COUNTEREXAMPLES, LAW_TABLE
+from verification.scenes.books import OPEN
+from verification.scenes.ledger import SCENES
+from verification.table import Column, Table, table_from
 
 ANY = (
     None,
@@ -226,6 +230,19 @@ def test_a_stage_with_failures_is_computed_again_and_its_traceback_is_kept_until
         and not list(tmp_path.rglob("*incomplete*"))
         and not list(tmp_path.rglob("*failed*"))
     )
+
+
+def test_the_page_quotes_the_row_of_the_printed_formula_and_the_widest_scene():
+    named = ("solver", "M", "J", "v⁻", "e", "v⁺", "relative energy gain")
+    rows = {
+        bulk.TABLE.key: [{"method": m, bulk.GAIN: m} for m in (bulk.NO_CLAMP, bulk.PRINTED)],
+        LAW_TABLE.key: [{CAUGHT: True}],
+        SCENES.key: [{"scene": str(x), OPEN: x} for x in (0.1, 0.3, 0.2)],
+        COUNTEREXAMPLES.key: [dict.fromkeys(named, bulk.PRINTED)],
+        energy.CERTIFIED_RUNS: [],
+    }
+    found = energy.numbers({key: table_from(given) for key, given in rows.items()})
+    assert (found["printed_largest_gain"], found["widest_scene"]) == (bulk.PRINTED, "0.3")
 
 
 def test_a_topic_that_fails_is_named_and_ctrl_c_is_no_failure(tmp_path, monkeypatch):
