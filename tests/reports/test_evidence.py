@@ -152,12 +152,12 @@ def test_whatever_decides_the_records_is_in_the_name_of_their_file(tmp_path, mon
         monkeypatch.setattr(stages, name, lambda: "another")
         made.append(Stage(tmp_path, "a", int, "quick"))
     assert len({stage.path for stage in made}) == len(made)
-    monkeypatch.setattr(keys, "scene_folder", lambda: tmp_path)
+    monkeypatch.setattr(keys, "scene_folder", lambda: tmp_path / "scenes")
     monkeypatch.setattr(keys, "_ROOT", tmp_path)
     monkeypatch.setattr(keys, "sources_hash", lambda folder: folder)
     versions = [keys.evidence_version.__wrapped__()]
-    (tmp_path / "verification").mkdir()
-    for path in (tmp_path / "peg.yaml", tmp_path / "verification" / "case.xml"):
+    for path in (tmp_path / "scenes" / "peg.yaml", tmp_path / "verification" / "case.xml"):
+        path.parent.mkdir()
         path.write_text("name: peg")
         versions.append(keys.evidence_version.__wrapped__())
     assert len(set(versions)) == 3
