@@ -91,9 +91,10 @@ class Question:
         chance = np.random.default_rng(0)
         q, _ = self.system.start
         felt = np.zeros(mechanism.nv, np.bool_)
-        for _ in range(_POSES if field.any() else 0):
-            felt |= mechanism.gravity(q, field) != 0.0
-            q = mechanism.integrate(q, chance.uniform(-1.0, 1.0, mechanism.nv), 1.0)
+        if field.any():
+            for _ in range(_POSES):
+                felt |= mechanism.gravity(q, field) != 0.0
+                q = mechanism.integrate(q, chance.uniform(-1.0, 1.0, mechanism.nv), 1.0)
         felt_by = mechanism.arrays.dof_body[: mechanism.nv][felt]
         return [mechanism.names[b] for b in dict.fromkeys(felt_by)]
 

@@ -265,11 +265,12 @@ class Simulation:
         """Give the compiled loop the hand's force of each step; return the number of valid steps
         and the error."""
         self.port.planned[:steps] = self.port.wrench
-        for k in range(steps if self._planned else 0):
-            try:
-                self.port.planned[k] = self._wrench_at(self.steps_done + k)
-            except IapbError as stop:
-                return k, stop
+        if self._planned:
+            for k in range(steps):
+                try:
+                    self.port.planned[k] = self._wrench_at(self.steps_done + k)
+                except IapbError as stop:
+                    return k, stop
         return steps, None
 
     def _wrench_at(self, step: int) -> Floats:

@@ -19,7 +19,6 @@ from numpy.typing import ArrayLike
 
 from iapb.errors import ArgumentError
 from iapb.lazy import needed
-from reference import Floats
 
 Rational = Any  # flint.fmpq_mat; named here because flint is imported only when used
 _flint = cache(partial(needed, "flint", "Exact arithmetic"))
@@ -39,11 +38,6 @@ class ExactImpact:
     def rank(self) -> int:
         """Exact rank of the contact Jacobian."""
         return len(self.independent_rows)
-
-    @property
-    def rounded_velocity(self) -> Floats:
-        """v⁺ rounded once to doubles (d,)."""
-        return np.array([float(x) for x in self.velocity])
 
 
 def exact_impact(

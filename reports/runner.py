@@ -81,7 +81,7 @@ class Runner:
             scene,
             found.law,
             found.coupling_in(scene),
-            world=_label(world, rendering),
+            world=world if rendering == "full" else f"{world} {rendering}",
             every=every,
             progress=self.progress,
         )
@@ -149,11 +149,6 @@ class Runner:
     def label(scene: Scene, world: str, rendering: str = "full") -> str:
         """Return the start of the file's name."""
         return "-".join([scene.name, world] + ([rendering] if rendering != "full" else []))
-
-
-def _label(world: str, rendering: str) -> str:
-    """Return world and rendering as `reference.worlds.run_world` records them."""
-    return world if rendering == "full" else f"{world} {rendering}"
 
 
 def run_inputs(scene: Scene, law: Any, coupling: Any, world: str, every: int = 1) -> dict[str, Any]:

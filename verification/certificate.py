@@ -450,7 +450,9 @@ def _certificate(batches: Iterable[Batch]) -> Certificate:
         for k in np.flatnonzero(judged[-1].gained).tolist():
             one = masses[k % len(masses)], before[k], after[k]
             largest = max(largest, relative_energy_gain(*one))
-            first, shown = (first, shown) if first >= 0 else (done + k, _shown(*one))
+            if first < 0:
+                first = done + k
+                shown = _shown(*one)
         if recorded is not None and len(before):
             with np.errstate(over="ignore", invalid="ignore"):  # an overflow fails the certificate
                 change = after - before

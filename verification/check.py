@@ -189,7 +189,9 @@ class Check:
             judged = judge_part(name, rows, None if role else self._fresh(study, name))
             if role in (MISPRINT, BEYOND):
                 judged = replace(judged, role=role)
-            parts.append(proved(judged, role) if role not in ("", MISPRINT, BEYOND) else judged)
+            elif role:  # the statement that proves it
+                judged = proved(judged, role)
+            parts.append(judged)
         return self._found(parts, table)
 
     def not_computed(self) -> Finding:
@@ -197,7 +199,7 @@ class Check:
         return self._found([Part("Not computed.", NOT_COMPUTED)], self.table_of(()))
 
     def _found(self, parts: Iterable[Part], table: Table) -> Finding:
-        return finding_of(self.key, self.key, self.question, "", parts, {self.key: table})
+        return finding_of(self.key, self.key, self.question, parts, {self.key: table})
 
     def _fresh(self, study: Study | None, name: str) -> Callable[[Region], Table] | None:
         """Return the function that draws and judges fresh rows of a part inside a region, up to
@@ -328,7 +330,6 @@ class Topic:
             self.key,
             self.title,
             self.question,
-            "",
             parts,
             {**tables, **quoted},
             [*failures, *(one for one in lost if one.case not in known)],

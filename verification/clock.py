@@ -38,11 +38,6 @@ class Times:
     samples: tuple[float, ...] = ()
 
     @property
-    def rounds(self) -> int:
-        """Number of samples."""
-        return len(self.samples)
-
-    @property
     def least(self) -> float:
         """Smallest sample."""
         return self.quantile(0.0)

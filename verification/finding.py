@@ -346,10 +346,10 @@ def finding_of(
     key: str,
     title: str,
     question: str,
-    answer: str,
     parts: Iterable[Part],
     tables: Mapping[str, Table] | None = None,
     failures: Sequence[Failure] = (),
+    answer: str = "",
 ) -> Finding:
     """Return the finding made of `parts` and `failures`: it has the worst verdict, and is timed if
     any part is."""

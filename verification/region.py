@@ -173,13 +173,12 @@ def _best(
 ) -> tuple[int, int, tuple[_Interval, ...]]:
     """Number of trials that the best pair of intervals keeps without a failure, minus the number of
     its bounds, and those of the two with a bound."""
-    held, failed = (
-        np.array([outcome is wanted for outcome in trials.holds]) for wanted in (True, False)
-    )
-    inside, other = (np.array([interval.inside for interval in scale]) for scale in (first, second))
-    kept, wrong = (
-        (inside & rows).astype(np.int64) @ other.T.astype(np.int64) for rows in (held, failed)
-    )
+    held = [outcome is True for outcome in trials.holds]
+    failed = [outcome is False for outcome in trials.holds]
+    inside = np.array([one.inside for one in first], np.int64)
+    other = np.array([one.inside for one in second], np.int64).T
+    kept = (inside * held) @ other
+    wrong = (inside * failed) @ other
     ends = np.add.outer(
         [interval.ends for interval in first], [interval.ends for interval in second]
     )

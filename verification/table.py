@@ -90,19 +90,11 @@ class Table:
             all(row[key] == value for key, value in values.items()) for row in self.records()
         )
 
-    def that(self, outcome: bool | None) -> Table:
-        """Return the rows with this outcome."""
-        return self.only(held is outcome for held in self.holds)
-
     def select(self, keys: Sequence[str]) -> Table:
         """Return the table with these columns, in this order."""
         at = [self.keys.index(key) for key in keys]
         kept = tuple(tuple(row[k] for k in at) for row in self.rows)
         return replace(self, columns=tuple(self.columns[k] for k in at), rows=kept)
-
-    def without(self, *keys: str) -> Table:
-        """Return the table without these columns."""
-        return self.select([key for key in self.keys if key not in keys])
 
     def judged(self, holds: Callable[[dict[str, Any]], bool | None]) -> Table:
         """Return the table with the outcome `holds(row)` of every row."""

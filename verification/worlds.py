@@ -198,10 +198,10 @@ def compare_worlds(
         f"worlds of {scene.name}",
         scene.title or scene.name,
         QUESTION,
-        " ".join([*headline, _answer(runs, series, own, against, unfit)]),
         parts,
         tables,
         failures,
+        " ".join([*headline, _answer(runs, series, own, against, unfit)]),
     )
     return replace(
         finding,
@@ -221,20 +221,17 @@ def _chosen(
     reference world."""
     if isinstance(worlds, str):
         worlds = worlds.split(",")
-    names = (
-        tuple(dict.fromkeys(name.strip() for name in worlds)) if worlds else default_worlds(scene)
-    )
+    names = tuple(name.strip() for name in worlds) if worlds else default_worlds(scene)
     if against is None:
-        wanted = "ideal-friction" if scene.largest_friction > 0.0 else "ideal"
-        against = (
-            wanted if worlds is None or wanted in names else "ideal" if "ideal" in names else wanted
-        )
+        against = "ideal-friction" if scene.largest_friction > 0.0 else "ideal"
+        if against not in names and "ideal" in names:
+            against = "ideal"
     for argument, name in [*(("worlds", name) for name in names), ("against", against)]:
         if name not in WORLDS and ":" not in name:
             raise ArgumentError(
                 argument, name, f"{one_of(name, WORLDS)}, or your engine as module:engine"
             )
-    return (*names, *([against] if against not in names else [])), against
+    return tuple(dict.fromkeys((*names, against))), against
 
 
 def _run(scene: Scene, world: str, say: Progress) -> Ran:

@@ -411,9 +411,10 @@ def check_scene(
                 f"{integrator}: set integrator: momentum, or contact.forces: paper",
             )
         )
-    for name in ("four-channel", "unilateral") if scene.hand is not None else ():
-        if coupling in (None, name) and getattr(scene.couplings, name.replace("-", "_")):
-            found += _coupled(start, name)
+    if scene.hand is not None:
+        for name in ("four-channel", "unilateral"):
+            if coupling in (None, name) and getattr(scene.couplings, name.replace("-", "_")):
+                found += _coupled(start, name)
     return tuple(found)
 
 
@@ -445,9 +446,10 @@ def _angles(thing: Any) -> Iterator[tuple[Path, float, int]]:
     joint = getattr(thing, "joint", "")
     if joint == "planar":
         yield ("position", 2), thing.position[2], 1
-    for field in ("position", "joint_limits") if joint == "revolute" else ():
-        for k, angle in enumerate(getattr(thing, field) or ()):
-            yield (field, k), angle, MANY_TURNS
+    elif joint == "revolute":
+        for field in ("position", "joint_limits"):
+            for k, angle in enumerate(getattr(thing, field) or ()):
+                yield (field, k), angle, MANY_TURNS
 
 
 def _about(scene: Scene, kind: str, path: Path, says: str) -> Caution:

@@ -31,7 +31,7 @@ def compute(runner: Runner, depth: str, progress: Callable[[int, int], None]) ->
     )
     quoted = value_tables({"runs": len(repeated), "same": same})
     tables = {"simulated again": table, **quoted}
-    return finding_of("survival", "Runs that repeat", LEAD, "", (part,), tables, failures)
+    return finding_of("survival", "Runs that repeat", LEAD, (part,), tables, failures)
 
 
 def _repeated(runner: Runner, name: str) -> Any:

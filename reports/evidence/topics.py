@@ -46,7 +46,7 @@ def failed_topic(name: str, failure: Failure) -> Finding:
     sentence = f"Not computed, after {failure.error}: {failure.reason}."
     key = name.replace(" ", "-")
     title = name.replace("-", " ").capitalize()
-    return finding_of(key, title, "", sentence, (Part(sentence, NOT_COMPUTED),))
+    return finding_of(key, title, "", (Part(sentence, NOT_COMPUTED),), answer=sentence)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from types import TracebackType
 from typing import Any
 
@@ -148,17 +148,6 @@ class Plot:
     def marks(self, points: Iterable[tuple[Any, Any]], look: LineStyle, **how: Any) -> None:
         """Draw the marks of a style without a line."""
         self.curve(points, look, **{"linestyle": "none", **how})
-
-    def lost(self, places: Sequence[float], look: LineStyle, height: float) -> None:
-        """Draw crosses at the upper rim at the x values `places` of failed cases."""
-        self.axes.plot(
-            places,
-            [height] * len(places),
-            "x",
-            color=look.color,
-            markersize=5,
-            transform=self.axes.get_xaxis_transform(),
-        )
 
     def log(self, x: str, y: str, scales: str = "xy", **limits: Any) -> None:
         """Name the axes and make those in `scales` logarithmic, with powers of ten as plain

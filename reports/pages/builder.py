@@ -42,7 +42,6 @@ QUOTED = (
     "claims",
     "data",
     "figures",
-    "energy",
     "proofs",
     "complementarity",
     "hard-cases",

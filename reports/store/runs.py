@@ -295,7 +295,7 @@ def _check(run: Run) -> None:
 
 
 def _run_in(file: Any, path: Path | str, read: Reader, budget: int | None = None) -> Run:
-    """Return the run in an open file; `read` is `read_values` (arrays in memory) or `dataset_of`
+    """Return the run in an open file; `read` is `values_at` (arrays in memory) or `dataset_at`
     (on disk)."""
     place = Budget(path, file, budget)
     texts = {

@@ -113,9 +113,9 @@ def evidence():
                 "C01",
                 "C01",
                 "energy never rises",
-                "half: $\\frac{1}{2}$",
                 (Part("p.", MIXED, "as printed"),),
                 {"C01": table},
+                answer="half: $\\frac{1}{2}$",
             ),
         ),
         topics=(
@@ -123,7 +123,6 @@ def evidence():
                 "stability",
                 "Walls",
                 "Asked.",
-                "It holds.",
                 (Part("It holds.", REPRODUCED),),
                 {"wide": table},
             ),

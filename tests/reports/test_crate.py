@@ -41,7 +41,7 @@ def out(tmp_path_factory):
         runner(scene, "PB")
         runner(scene.with_values({"name": "own"}), "PB")
         table = titled(("κ", "gain"), ((1e3, 2e-16),))
-        return (finding_of("C07", "C07", "s", "h", (Part("p", REPRODUCED),), {"C07": table}),)
+        return (finding_of("C07", "C07", "s", (Part("p", REPRODUCED),), {"C07": table}),)
 
     stage = Stage(folder / "tables", "claims", tuple[Finding, ...], "quick").fill(runner, compute)
     with pytest.MonkeyPatch.context() as patch:

@@ -65,7 +65,6 @@ FINDING = finding_of(
     "mechanics",
     "Title",
     "Asked?",
-    "Answered.",
     (Part("s", VERDICTS[0], name="p", held=1, decided=2, timed=True),),
     {
         "judged": Table(
@@ -83,6 +82,7 @@ FINDING = finding_of(
         "empty": Table((Column("row"),)),
         "bare": Table(()),
     },
+    answer="Answered.",
 )
 
 

@@ -64,8 +64,8 @@ def joined(evidence):
     return "\n".join(build_report(evidence).values())
 
 
-def one(key, *parts, said="a", **more):
-    return finding_of(key, key, "q", said, parts, **more)
+def one(key, *parts, **more):
+    return finding_of(key, key, "q", parts, answer="a", **more)
 
 
 EVIDENCE = Evidence(
@@ -75,9 +75,9 @@ EVIDENCE = Evidence(
             "C01",
             "C01",
             "KE never rises <b>",
-            "half of the printed loss: $\\frac{1}{2}$",
             (Part("as printed.", MIXED, "as printed"),),
             {"C01": titled(("κ", "gain"), ((1e3, 2e-16),))},
+            answer="half of the printed loss: $\\frac{1}{2}$",
         ),
         one("C02", Part("n.", REFUTED)),
         one("C10", Part("p.", REPRODUCED)),
@@ -87,9 +87,9 @@ EVIDENCE = Evidence(
             "stability",
             "Walls",
             "Asked <here>.",
-            "All hold.",
             (Part("It holds to 1e-14.", REPRODUCED),),
             {"trees": titled(("joints", "error"), ((3, 1e-14),))},
+            answer="All hold.",
         ),
     ),
     effects={

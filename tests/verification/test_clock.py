@@ -19,7 +19,7 @@ def test_contestants_take_turns_in_an_order_that_changes_and_the_first_round_doe
     rounds = ["".join(order[k : k + 3]) for k in range(0, len(order), 3)]
     assert len(rounds) == 21 and {"".join(sorted(each)) for each in rounds} == {"abc"}
     assert len(set(rounds)) == 6  # every order occurs
-    assert [times.rounds for times in found.values()] == [20] * 3
+    assert [len(times.samples) for times in found.values()] == [20] * 3
     assert (
         min(min(times.samples) for times in found.values()) > 3.0
     )  # the warm round had 1, 2 and 3

@@ -34,8 +34,7 @@ def claim_tables(findings: Iterable[Finding], failures: list[Failure]) -> dict[s
             table = claims[key].tables[key]
             values |= attempt(f"numbers of {key}", partial(function, table), failures) or {}
     values |= attempt("limits of C10", partial(_limits, claims), failures) or {}
-    counts = attempt("numbers of impacts", lambda: list(_counts(claims)), failures) or []
-    values |= {f"{key} {kind}": count for key, kind, count in counts}
+    values |= attempt("numbers of impacts", partial(_counts, claims), failures) or {}
     tables = value_tables(values)
     rows: list[dict[str, Any]] | None = attempt(
         LEFT_OPEN, lambda: list(left_open(claims)), failures
@@ -43,23 +42,25 @@ def claim_tables(findings: Iterable[Finding], failures: list[Failure]) -> dict[s
     return tables | {LEFT_OPEN: table_from(rows or ())}
 
 
-def _counts(claims: Claims) -> Iterator[tuple[str, str, float]]:
-    """Yield the largest error of each claim on impacts, and the impacts of its largest part, over
+def _counts(claims: Claims) -> dict[str, float]:
+    """Return the largest error of each claim on impacts, and the impacts of its largest part, over
     the parts that decide."""
+    found = dict[str, float]()
     for key, one in claims.items():
         table = one.tables[key]
         if {"error", "impacts", "bound"} <= set(table.keys):
             named = {part.name for part in one.parts if part.role in DECIDING}
             drawn = [row for row in table.records() if row["impacts"] and row["part"] in named]
-            yield key, "error", max((row["error"] for row in drawn), default=0.0)
+            found[f"{key} error"] = max((row["error"] for row in drawn), default=0.0)
             counts = dict.fromkeys(named, 0)
             for row in drawn:
                 counts[row["part"]] += row["impacts"]
-            yield key, "impacts", max(counts.values(), default=0)
+            found[f"{key} impacts"] = max(counts.values(), default=0)
+    return found
 
 
 def _limits(claims: Claims) -> dict[str, Any]:
-    """Return the largest tilt [degrees] up to which C10 holds in x and in y, in words of numbers."""
+    """Return the largest tilt [degrees] up to which C10 holds in x and in y."""
     if "C10" not in claims:
         return {}
     parts = {part.name: part for part in claims["C10"].parts}

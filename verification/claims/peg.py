@@ -93,24 +93,19 @@ def trace(study: Study, condition: Condition, world: str, rendering: str = "full
     """Return the trace of the peg; conditions that differ only in values the world ignores share
     one run. Only runs of the rigid worlds are stored: the engine takes 7 ms."""
     seen = condition.seen_by(world, rendering)
-    wanted = place(study, seen), world, rendering
+    scene = place(study, seen)
     if world == "PB" and seen.force_limit < 1.0:  # the world PB has a device without limits
         return study.once(
             (seen, world),
             lambda: trace_of(
-                simulate(
-                    wanted[0],
-                    LimitedPenalty(),
-                    find_world(world).coupling_in(wanted[0]),
-                    world=world,
-                )
+                simulate(scene, LimitedPenalty(), find_world(world).coupling_in(scene), world=world)
             ),
         )
     rigid = world in ("ideal", "CBuc")
     if rigid and study.asked is not None:
-        study.asked(*wanted)
+        study.asked(scene, world, rendering)
     run: Any = study.run if rigid else study.simulate
-    return study.once((seen, world, rendering), lambda: trace_of(run(*wanted)))
+    return study.once((seen, world, rendering), lambda: trace_of(run(scene, world, rendering)))
 
 
 def peg_claim(

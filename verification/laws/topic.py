@@ -85,8 +85,8 @@ def _trajectories(study: Study) -> tuple[list[SceneCase], list[Trajectory], list
     )
     every = list(runs)
     finite = TRAJECTORY_LAWS["finite"]
-    sound = attempt("finite", lambda: [(one, finite.check(one)) for one in every], []) or ()
-    return scenes, every, [one for one, found in sound if found is None or found.passed] or every
+    sound = attempt("finite", lambda: [one for one in every if finite.check(one).passed], [])
+    return scenes, every, sound or every
 
 
 def _trajectory_law(study: Study, name: str) -> Row:

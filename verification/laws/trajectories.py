@@ -25,7 +25,7 @@ from verification.impacts import EPS, over
 from verification.laws.bounds import FACTORED, Found, Law, LawResidual, law
 
 TRAJECTORY_LAWS: dict[str, Law] = {}
-BY_THE_ENGINE = ("impulse-augmented penalty", "penalty")
+PLAIN_LAWS = ("impulse-augmented penalty", "penalty")
 TINY = float(np.finfo(float).tiny)
 HALF_TURN = np.pi / np.sqrt(3.0)  # [rad] of each of the three rates of a body
 _ARRAYS = (
@@ -52,11 +52,11 @@ class Trajectory:
     run: Run
 
     @property
-    def by_the_engine(self) -> bool:
+    def by_plain_euler(self) -> bool:
         """Whether the engine made the run with semi-implicit Euler: first v changes, then q moves
         by the new v."""
         return (
-            self.run.law in BY_THE_ENGINE
+            self.run.law in PLAIN_LAWS
             and self.run.law_settings.get("integrator") == "semi_implicit_euler"
         )
 
@@ -70,7 +70,7 @@ class Trajectory:
     def is_explained(self) -> bool:
         """Whether all that moves the bodies is recorded: a unilateral coupler moves the tool from
         outside."""
-        return self.by_the_engine and self.run.coupling != "unilateral"
+        return self.by_plain_euler and self.run.coupling != "unilateral"
 
     @cached_property
     def system(self) -> Any:
@@ -327,7 +327,7 @@ def contacts_push_by_the_penalty(trajectory: Trajectory) -> Found:
     """
     run = trajectory.run
     contacts = trajectory.run.contacts
-    if not trajectory.by_the_engine or trajectory.implicit or not len(contacts.gap):
+    if not trajectory.by_plain_euler or trajectory.implicit or not len(contacts.gap):
         return None
     constants = run.scene_resolved["contact"]
     K = constants["stiffness"]
@@ -353,7 +353,7 @@ def friction_stays_in_its_cone(trajectory: Trajectory) -> Found:
     """
     run = trajectory.run
     contacts = trajectory.run.contacts
-    if not trajectory.by_the_engine or trajectory.implicit or not len(contacts.gap):
+    if not trajectory.by_plain_euler or trajectory.implicit or not len(contacts.gap):
         return None
     most = trajectory.system.scene.largest_friction * np.maximum(contacts.normal_force, 0.0)
     length = np.linalg.norm(contacts.friction_force, axis=1)

@@ -109,7 +109,7 @@ def judge_world(
             continue
         run = simulate(scene, world=world)
         found = dict(judge_run(run))
-        if all(residual.passed for name, residual in found.items() if name == "finite"):
+        if found["finite"].passed:
             trajectory = Trajectory(run)
             states = {name: one.check(trajectory) for name, one in STATE_LAWS.items()}
             found |= {name: residual for name, residual in states.items() if residual is not None}

@@ -286,19 +286,18 @@ class _Trial:
         damping_goal, friction_goal = search.goals
         most = [self.most(goal) for goal in search.goals]
         self.damping, self.friction = (one.needed for one in most)
-        other = search.from_rest(friction_goal, most[0], LONG)  # it needs some friction, too
+        other = search.from_rest(friction_goal, most[0].motion, LONG)  # it needs some friction, too
         self.friction = max(self.friction, other.needed)
-        if search.unbounded(damping_goal, most[0]):
+        if search.unbounded(damping_goal, most[0].motion):
             self.damping = np.inf
         if self.damping == np.inf and most[0].motion is not None:
             slower = [one_pass(most[0].motion, 2**k) for k in range(SLOWER + 1)]
-            most += [search.from_rest(friction_goal, Found(motion=one), 0) for one in slower]
+            most += [search.from_rest(friction_goal, one, 0) for one in slower]
             self.friction = max(self.friction, *(one.needed for one in most[1:]))
-        judged = {"energy": most, "bounded": [search.largest], "finite": [search.motion_of_fault]}
-        for name, ones in judged.items():
-            for one in ones:
-                if one.motion is not None:
-                    self.judge(name, one.motion)
+        for one in most:
+            self.judge("energy", one.motion)
+        self.judge("bounded", search.largest.motion)
+        self.judge("finite", search.motion_of_fault)
         yield
         if fastest is not None and not search.late:
             effort = SLOW_EFFORT * search.effort
@@ -318,8 +317,7 @@ class _Trial:
         if other.fault and not search.fault:
             search.fault = other.fault
             search.motion_of_fault = other.motion_of_fault
-            if other.motion_of_fault.motion is not None:
-                self.judge("finite", other.motion_of_fault.motion)
+            self.judge("finite", other.motion_of_fault)
 
     def most(self, goal: Goal) -> Found:
         """Improve the best motions for a goal; return the best from rest."""
@@ -360,9 +358,9 @@ class _Trial:
         every = [one.motion for own in self.search.best.values() for one in own.values()]
         return [motion for motion in every if motion is not None]
 
-    def judge(self, name: str, motion: Motion) -> None:
-        """Judge a law on a motion."""
-        if name not in self.laws:
+    def judge(self, name: str, motion: Motion | None) -> None:
+        """Judge a law on a motion, if there is one."""
+        if motion is None or name not in self.laws:
             return
         verdict = self.verdicts[name]
         residual, fault = residual_of(self.laws[name], motion, self.search.port, self.terms)

@@ -85,7 +85,7 @@ class Search:
     longest: int = LONGEST
     effort: float = 1.0  # share of the calls
     fault: str = ""
-    motion_of_fault: Found = field(default_factory=Found)
+    motion_of_fault: Motion | None = None
 
     @property
     def device(self) -> BareDevice:
@@ -119,7 +119,7 @@ class Search:
         except ResolverFault as fault:
             if not self.fault:
                 self.fault = str(fault)
-                self.motion_of_fault = Found(motion=motion)
+                self.motion_of_fault = motion
             return None
         with np.errstate(over="ignore"):
             largest = float(np.linalg.norm(forces, axis=1).max())
@@ -177,8 +177,9 @@ class Search:
     def look(self) -> None:
         """Try motions of every kind until CALLS calls of the law are made."""
         last = self.port.calls + self.effort * CALLS
-        for motion in () if self.slow else itertools.chain(self.steep(), self.edges()):
-            self.try_on(motion)
+        if not self.slow:
+            for motion in itertools.chain(self.steep(), self.edges()):
+                self.try_on(motion)
         for motion in self.drawn():
             if self.port.calls > last or self.late:
                 return
@@ -216,7 +217,9 @@ class Search:
     def edges(self) -> Iterator[Motion]:
         """Yield chatter across the encoder's edges near the start, of many sizes."""
         step = self.device.resolution
-        for k in range(4 if step > 0.0 else 0):
+        if step == 0.0:
+            return
+        for k in range(4):
             axis = k % len(self.start)
             edge = self.start.copy()
             edge[axis] = (np.floor(edge[axis] / step) + 0.5 + k) * step
@@ -372,14 +375,13 @@ class Search:
             for samples in (LONG, self.longest):
                 in_time = best.motion is None or not self.late
                 if one.needed > 1.002 * best.needed and in_time:
-                    tried = self.from_rest(goal, one, round(self.effort * samples))
+                    tried = self.from_rest(goal, one.motion, round(self.effort * samples))
                     best = max(best, tried, key=lambda own: own.needed)
         return best
 
-    def from_rest(self, goal: Goal, one: Found, samples: int) -> Found:
+    def from_rest(self, goal: Goal, motion: Motion | None, samples: int) -> Found:
         """Play a motion from rest for so many samples; return what it needs, and keep its
         half-plane."""
-        motion = one.motion
         if motion is not None and len(motion.cycle):
             motion = replace(motion, repeats=8 + samples // len(motion.cycle))
         sums = None if motion is None else self.sums(motion)
@@ -393,13 +395,13 @@ class Search:
         self.planes.append((work, sums.damped[at], sums.rubbed[at]))
         return Found(float(needed[at]), motion)
 
-    def unbounded(self, goal: Goal, one: Found) -> bool:
+    def unbounded(self, goal: Goal, motion: Motion | None) -> bool:
         """Whether no damping is enough: a single pass gives as much at each half of its speed, a loop
         needs twice as much, or chatter at each half of its size."""
-        if one.motion is None:
+        if motion is None:
             return False
-        cycle = one.motion.cycle
-        if self.gives_once(one.motion):
+        cycle = motion.cycle
+        if self.gives_once(motion):
             return True
         if not len(cycle):
             return False

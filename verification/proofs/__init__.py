@@ -113,7 +113,6 @@ def on_proofs(
         "proofs",
         "Proofs",
         "Which statements are proved?",
-        "",
         parts,
         tables | value_tables(numbers),
         failures,

@@ -105,7 +105,6 @@ def test_the_outcome_of_a_claim_follows_from_the_parts_that_the_paper_states(par
         "C",
         "C",
         "",
-        "",
         [
             Part("", verdict, name, role=role)
             for name, (verdict, role) in zip(named, parts, strict=False)
