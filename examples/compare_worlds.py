@@ -21,7 +21,7 @@ walls:
 contact: {stiffness: 10000, damping: 100, friction: 0.5, restitution: 0}
 """)
 
-finding = compare_worlds("slope.yaml", worlds=["IAPB", "PB", "ideal-friction"], impacts=2)
+finding = compare_worlds("slope.yaml", worlds=["IAPB", "PB", "ideal-friction"])
 print(finding.answer)
 for row in finding.tables["worlds"].records():
     print({name: row[name] for name in list(row)[:4]})

@@ -85,8 +85,14 @@ class Recorder:
         if not self.records or len(self.records[-1].steps.q) < self.records[-1].used[0] + size:
             room = int(_ROOM / max(1, self._line_bytes))
             self.records.append(make_record(max(size, min(left, room)), *self.shape))
+        record = self.records[-1]
+        before = int(record.used[0])
         started = time.perf_counter()
-        done, stop = self.simulation.advance_chunk(self.records[-1], size)
+        try:
+            _, stop = self.simulation.advance_chunk(record, size)
+        except KeyboardInterrupt as interrupt:  # raised when the steps of the chunk were done
+            stop = interrupt
+        done = int(record.used[0]) - before
         self.timings.append((done, time.perf_counter() - started))
         self.steps += done
         return stop

@@ -236,9 +236,12 @@ class Simulation:
                 state.contact_count[0] = state.impacts.logged[0] = 0
                 expected = f"a count from 0 to {most}, the size of its buffer"
                 raise ArgumentError(f"{law} {what}", given, expected)
+        checked = {}
         for name in _STEP_VECTORS:
-            target = getattr(state, name)
-            target[:] = finite_array(f"{law} {name}", getattr(result, name), target.shape)
+            shape = getattr(state, name).shape
+            checked[name] = finite_array(f"{law} {name}", getattr(result, name), shape)
+        for name, vector in checked.items():
+            getattr(state, name)[:] = vector
         tool = self.system.tool_tree
         state.state_of_tree[tool if tool >= 0 else slice(None)] = result.state
 

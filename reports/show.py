@@ -4,7 +4,6 @@ work."""
 from __future__ import annotations
 
 import json
-import re
 import sys
 import textwrap
 import time
@@ -95,19 +94,18 @@ def table_text(table: Table) -> str:
             console.print(_printed(block))
             console.print()
     lines = [line.rstrip() for line in printed.get().splitlines()]
-    return "\n".join(lines).rstrip().replace("\N{NO-BREAK SPACE}", " ")
+    return "\n".join(lines).rstrip()
 
 
 class _Column:
-    """One column: its title, whose unit stays on one line, its cells, and its width."""
+    """One column: its title, whose unit has a line of its own, its cells, and its width."""
 
     def __init__(self, title: str, cells: list[str]) -> None:
-        self.title = re.sub(
-            r"\[[^]]*\]$", lambda unit: unit[0].replace(" ", "\N{NO-BREAK SPACE}"), title
-        )
+        name, bracket, unit = title.partition(" [")
+        self.title = f"{name}\n[{unit}" if bracket else name
         self.cells = cells
         lines = (line for cell in cells for line in textwrap.wrap(cell, _WIDEST))
-        self.width = max(map(len, [*lines, *self.title.split(" ")]))
+        self.width = max(map(len, [*lines, *name.split(" "), f"[{unit}"]))
 
 
 def _printed(columns: list[_Column]) -> Any:

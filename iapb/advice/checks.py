@@ -471,7 +471,7 @@ def _inertias(start: Start) -> Iterator[Caution]:
             filled = filled_with(body.shapes, 1.0)
             largest = np.linalg.norm(np.atleast_2d(filled["inertia"]), 2)
             times = high / (largest * body.mass / filled["mass"])
-            if not 1.0 / STRANGE < times < STRANGE:
+            if times < 1.0 / STRANGE:  # a larger one is that of parts without shapes
                 says = f" is {times:.2g} times that of its shapes with its mass: is the unit kg m2?"
                 yield _about(start.scene, "inertia", ("bodies", i, "inertia"), says)
 

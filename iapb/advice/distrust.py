@@ -62,10 +62,13 @@ def distrust_of(run: Run, system: System | None = None) -> tuple[str, ...]:
     if not (np.isfinite(run.q).all() and np.isfinite(run.v).all()):
         return ("positions or velocities are not finite",)
     named = tuple(body.get("name") for body in run.scene_resolved.get("bodies", ()))
-    if not run.steps or named != run.body_names:
+    if not run.steps or named != tuple(run.body_names):
+        return ()
+    system = system or System(scene_from_values(run.scene_resolved))
+    if (run.q.shape[1], run.v.shape[1]) != (system.mechanism.nq, system.mechanism.nv):
         return ()
     with np.errstate(all="ignore"):  # the square of what exploded may overflow
-        seen = _Seen(run, system or System(scene_from_values(run.scene_resolved)))
+        seen = _Seen(run, system)
         driven = tuple(_driven(seen))
         if driven:  # what the bodies then do follows from it
             return driven
@@ -94,7 +97,7 @@ class _Seen:
     def trifle(self, bodies: Booleans) -> float:
         """Negligible energy [J] of some bodies: to lift each by a thousandth of its size; and
         rounding of the scene."""
-        rounding = 1e-14 * self.run.energy["kinetic"].max()
+        rounding = 1e-14 * np.max(self.run.energy.get("kinetic", 0.0))
         weights = np.linalg.norm(self.system.gravity) * self.mechanism.arrays.mass
         sizes = np.where(np.isinf(self.sizes), 0.0, self.sizes)[:-1]
         return rounding + 1e-3 * (weights * sizes)[bodies].sum()
@@ -140,7 +143,7 @@ def _books(seen: _Seen) -> Iterator[_Book]:
     is a balance."""
     run = seen.run
     trees = seen.mechanism.tree_of_body
-    if "integration_residual" in run.energy:
+    if {"kinetic", "potential", "hand_work", "coupling_work"} <= run.energy.keys():
         yield _balance(seen, run.energy, trees >= 0, "")
     ledgers = {
         t: _ledger(seen, t)
@@ -208,7 +211,11 @@ def _balance(seen: _Seen, energy: dict[str, Floats], bodies: Booleans, name: str
     gap = contacts.gap[rows][bodies[contacts.body_a[rows]]]
     springs = _in_overlaps(seen, np.minimum(gap, 0.0), bodies)
     at_hand = _at_hand(energy) + springs
-    friction = energy["friction_work"]
+    total = energy["kinetic"] + energy["potential"]
+    excess = total[1:] - _start(energy) - energy["hand_work"] - energy["coupling_work"]
+    if "integration_residual" in energy:  # the book itself must not add any, either
+        excess = np.maximum(excess, _made_inside(energy))
+    friction = energy.get("friction_work", np.zeros(1))
     most = UNACCOUNTED * at_hand + seen.trifle(bodies)
     if not friction.max() <= most:
         # The ledger takes the way of the velocity after the force. Friction that only turns the
@@ -216,7 +223,16 @@ def _balance(seen: _Seen, energy: dict[str, Floats], bodies: Booleans, name: str
         own = np.isin(seen.mechanism.tree_of_dof, seen.mechanism.tree_of_body[bodies])
         run = seen.run
         friction = np.cumsum(_work(run.friction_force[:, own], run.v[:, own], run.dt))
-    return _Book(name, friction, _made_inside(energy) - springs, at_hand, most)
+    return _Book(name, friction, excess - springs, at_hand, most)
+
+
+def _start(energy: dict[str, Floats]) -> float:
+    """Return the energy [J] at the start of the run, also where the arrays are a later part of it."""
+    total = energy["kinetic"] + energy["potential"]
+    if "integration_residual" not in energy:  # another engine gives a whole run
+        return total[0]
+    worked = energy["hand_work"] + energy["coupling_work"] + _made_inside(energy)
+    return total[1] - worked[0]
 
 
 def _made_inside(energy: dict[str, Floats]) -> Floats:
@@ -243,10 +259,7 @@ def _at_hand(energy: dict[str, Floats]) -> float:
     """Return the energy available [J]: at the start, by loss of height, and by the work of hand and
     coupling."""
     works = energy["hand_work"], energy["coupling_work"]
-    potential = energy["potential"]
-    end = energy["kinetic"][-1] + potential[-1]
-    start = end - sum(work[-1] for work in works) - _made_inside(energy)[-1]
-    return start - potential.min() + sum(np.abs(work).max() for work in works)
+    return _start(energy) - energy["potential"].min() + sum(np.abs(work).max() for work in works)
 
 
 def _driven(seen: _Seen) -> Iterator[str]:

@@ -73,7 +73,7 @@ class Impact(NamedTuple):
         inactive.
     status : ``"complete"``; ``"budget"``: the row budget stopped the method early;
         ``"not solved"``: a contact still closes after Poisson's law by more than 1e-6 of the
-        largest |J v⁻|, which nearly opposed rows and κ(M) from 1e15 can cause (the energy does not
+        largest |J v⁻|, which nearly opposed rows and κ(M) from 1e12 can cause (the energy does not
         rise in this case either); ``"reduced"``: no p_t that obeys Coulomb's law was found (there may be
         none). p_t then maximizes the dissipation within the friction limits of the frictionless
         impact. It stays in the friction cones, and passivity and restitution still hold.

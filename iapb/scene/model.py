@@ -522,13 +522,15 @@ def _across_parts(given: Any) -> Mistakes:
     bodies = _outlines(given)
     walls = _mappings(given, "walls")
     names = [body.name for body in bodies]
-    known: dict[str | None, str] = {WORLD: "the static world"}
-    for part, own in (("bodies", names), ("walls", [_text(wall, "name") for wall in walls])):
+    for part, own, known in (
+        ("bodies", names, {WORLD: "the static world"}),
+        ("walls", [_text(wall, "name") for wall in walls], {}),
+    ):
         for i, name in enumerate(own):
             if name in known:
                 yield (part, i, "name"), name, f"a name of its own: {known[name]} has this one"
             elif name is not None:
-                known[name] = "an earlier one" if part == "walls" else "a body"
+                known[name] = "an earlier one"
     roots = [body.root for body in bodies]
     for i, body in enumerate(bodies):
         if body.parent not in (None, WORLD, *names[:i]):

@@ -213,13 +213,27 @@ def bodies_of(robot: Robot, folder: Path, added: Added, number: int) -> list[dic
 def _start(robot: Robot, link: Link, limits: Range | None) -> tuple[float, ...]:
     """Return the start of a link's joint: as given, else the neutral one or the nearest within the
     limits."""
-    given = robot.position.get(link.name)
-    if given or link.body.mimic:
-        return given or ()
     neutral = KINDS[link.body.joint.kind].neutral
-    if limits is None or limits[0] > limits[1]:  # nothing is in both ranges: refused later
-        return neutral
-    return (min(max(neutral[0], limits[0]), limits[1]),)
+    given = robot.position.get(link.name)
+    if link.body.mimic:
+        return given or ()
+    if limits is None or (given and len(given) != 1):
+        return given or neutral
+    low, high = limits
+    if low >= high:
+        raise ArgumentError(
+            f"limits of robot {robot.name}, link {link.name}",
+            [low, high],
+            f"limits of joint {link.joint} and of those that follow it with a range in common; "
+            "leave_out: {JOINT: [limit]} leaves those of one out",
+        )
+    if given and not low <= given[0] <= high:
+        raise ArgumentError(
+            f"position of robot {robot.name}, link {link.name}",
+            given[0],
+            f"a start within the limits [{low:g}, {high:g}] of joint {link.joint}",
+        )
+    return given or (min(max(neutral[0], low), high),)
 
 
 def _body_name(robot: Robot, link: str) -> str:

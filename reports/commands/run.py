@@ -46,6 +46,7 @@ Values = Annotated[
 ]
 WORTH_SAYING = 60.0  # [s] expected computing time
 DISTRUSTED = 3  # exit status of a run whose result is not to be trusted
+ROUNDING = 1e-14  # share of the kinetic energy: a smaller loss is printed as 0
 SHOWN_COORDINATES = 12  # more would not fit into a readable line
 
 
@@ -166,7 +167,9 @@ def describe(run: Run, existed: bool) -> Iterator[str]:
         yield f"Recorded are {run.steps} of them: one of {run.every}, and those with an impact."
     if len(impacts.step):
         taken = (float(np.sum(block)) for block in blocks(impacts.energy_lost))
-        lost = round(sum(taken), 15) + 0.0  # a rounding error is printed as 0
+        lost = sum(taken)
+        if abs(lost) <= ROUNDING * float(np.max(run.energy.get("kinetic", 0.0))):
+            lost = 0.0
         most = max(int(block.max()) for block in blocks(impacts.rows))
         yield (
             f"{counted(len(impacts.step), 'impact')}, the first at "

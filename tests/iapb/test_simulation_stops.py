@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from iapb import recording
+from iapb import recording, simulation
 from iapb.contact.laws import ImpulseAugmented, Penalty
 from iapb.errors import ArgumentError, IapbError
 from iapb.haptics.coupling import FourChannel
@@ -74,6 +74,22 @@ def test_ctrl_c_keeps_the_chunks_done(law, monkeypatch):
     whole = simulate(PEG, ImpulseAugmented(), steps=STEPS)
     assert np.array_equal(run.q, whole.q[:271]) and np.array_equal(run.impulse, whole.impulse[:270])
     assert np.array_equal(run.contacts.gap, whole.contacts.gap[: whole.contacts.offsets[270]])
+
+
+def test_ctrl_c_during_the_compiled_loop_keeps_its_steps(monkeypatch):
+    """Python raises it when the loop returns, before anything has counted the steps."""
+    monkeypatch.setattr(recording, "_STEPS_PER_CHUNK", 90)
+    loop = simulation.run_steps
+    calls = []
+
+    def interrupted(*arguments):
+        calls.append(loop(*arguments))
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+        return calls[-1]
+
+    monkeypatch.setattr(simulation, "run_steps", interrupted)
+    assert_readable(simulate(PEG, steps=STEPS), 270)
 
 
 def test_ctrl_c_inside_a_law_written_in_python_keeps_the_steps_done():

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from iapb.errors import IapbError
+from reports.cli import _end_politely
 from reports.workers import executor
 
 ORPHANING = """
@@ -64,3 +65,12 @@ def test_a_worker_whose_parent_was_killed_ends(tmp_path):
 def test_a_killed_worker_is_one_of_our_errors():
     with pytest.raises(IapbError, match="worker process was killed"), executor(1) as pool:
         pool.submit(suicide).result(60)
+
+
+def test_a_polite_signal_ends_a_command_like_ctrl_c():
+    before = signal.signal(signal.SIGTERM, _end_politely)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGTERM)
+    finally:
+        signal.signal(signal.SIGTERM, before)

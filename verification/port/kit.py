@@ -61,8 +61,8 @@ class ForceReport(Report):
     Attributes
     ----------
     damping_needed : least b [N s/m] at the device's friction for any hand; infinite if no damping is
-        enough, as a loop shows.
-    friction_needed : least f_c [N] at the device's damping.
+        enough, as a loop shows; NaN if the law gave no force in some motion.
+    friction_needed : least f_c [N] at the device's damping; NaN likewise.
     slow_damping : least b for hands without frequencies above `fastest` [Hz], measured; None
         without `fastest`.
     edge : (n, 2) points (b, f_c) on the edge of the passive set, if asked for.
@@ -243,8 +243,8 @@ def check_force(
         terms,
         seed,
         tuple(trial.verdicts.values()),
-        trial.damping,
-        trial.friction,
+        np.nan if search.fault else trial.damping,
+        np.nan if search.fault else trial.friction,
         fastest,
         trial.slow,
         trial.edge,

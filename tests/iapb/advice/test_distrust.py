@@ -83,7 +83,7 @@ def test_each_reason_is_found_in_the_arrays_of_a_sound_run() -> None:
     rising = np.linspace(0.0, 1.0, 200)
     lost = run.q.copy()
     lost[-1, 0] = np.nan
-    excess = {"integration_residual": run.energy["integration_residual"] + rising}
+    excess = {"kinetic": run.energy["kinetic"] + np.append(0.0, rising)}
     for planted, why in (
         (replace(run, energy=run.energy | excess), "above start"),
         (replace(run, energy=run.energy | {"friction_work": rising}), "its energy is"),
