@@ -220,7 +220,7 @@ def test_problem_files_npz_and_robots_cannot_ask_for_any_memory_nor_show_another
     robots = [{"name": f"r{k}", "urdf": "absent.urdf"} for k in range(1000)]
     scene = {"name": "s", "dimensions": 3, "rate": 100, "duration": 1, "bodies": []}
     (tmp_path / "s.yaml").write_text(json.dumps(scene | {"robots": robots}))
-    assert "at most 100 robots" in refused("run", tmp_path / "s.yaml")
+    assert "at most 100 items" in refused("run", tmp_path / "s.yaml")
 
 
 def test_a_pipe_is_refused_and_not_waited_for_and_odd_encodings_are_refused(tmp_path, monkeypatch):
