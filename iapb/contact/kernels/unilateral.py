@@ -265,9 +265,8 @@ def poisson_impact(d, count, restitution, tolerance, clamped, work, push, share,
     for i in range(count):
         if impulses[i] > 0.0:
             lowest = min(lowest, restitution[i])
-    for k in range(
-        d
-    ):  # Aᵀp_c without the rounding of p_c, which is large where rows are nearly opposed
+    # Aᵀp_c without the rounding of p_c, which is large where rows are nearly opposed
+    for k in range(d):
         compressed[k] += lowest * (compressed[k] - u[k])
     for i in range(count):
         returned = (restitution[i] - lowest) * impulses[i]
