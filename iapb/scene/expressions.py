@@ -13,7 +13,8 @@ import operator
 from collections.abc import Callable
 from decimal import Decimal
 from functools import cache
-from typing import Annotated
+from threading import Lock
+from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator
 
@@ -66,11 +67,24 @@ _KNOWN = (
 )
 
 
+_parsing = Lock()
+
+
+def syntax_tree(source: str | bytes, mode: str = "exec") -> Any:
+    """Return `ast.parse` of a source, one thread at a time.
+
+    Python 3.11 raises SystemError where two threads parse and a callback of the garbage collector
+    lets them take turns, as on a worker of dask.
+    """
+    with _parsing:
+        return ast.parse(source, mode=mode)
+
+
 @cache
 def function_of(text: str) -> Function:
     """Return the function of t that a checked text describes; it raises IapbError if its value is
     not finite."""
-    inner = _made(ast.parse(text, mode="eval").body)
+    inner = _made(syntax_tree(text, mode="eval").body)
 
     def function(t: float) -> float:
         try:

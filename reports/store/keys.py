@@ -21,6 +21,7 @@ import numpy as np
 from iapb.errors import ArgumentError, RunFileError
 from iapb.run import Run
 from iapb.scene import scene_folder
+from iapb.scene.expressions import syntax_tree
 from reports.store.io import blocks, write_whole
 from reports.store.schema import GROUPS, RESULT_GROUPS
 
@@ -132,7 +133,7 @@ def sources_hash(folder: str) -> str:
 
 def code_hash(source: bytes) -> str:
     """Return a hash of Python code that does not depend on comments, docstrings and layout."""
-    tree = ast.parse(source)
+    tree = syntax_tree(source)
     for node in ast.walk(tree):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
             if ast.get_docstring(node, clean=False) is not None:

@@ -3,7 +3,10 @@ law of its own."""
 
 from __future__ import annotations
 
+import gc
 import math
+import time
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -14,7 +17,7 @@ from iapb.contact.laws import INTEGRATORS, ImpulseAugmented, Penalty
 from iapb.errors import IapbError
 from iapb.numerics.elementary import sine_cosine
 from iapb.scene import Scene, find_scene, load_scene, scene_from_text
-from iapb.scene.expressions import function_of
+from iapb.scene.expressions import function_of, syntax_tree
 from iapb.simulation import Simulation, simulate
 from iapb.system import System
 from tests.iapb.contact.paper import scene_of
@@ -107,6 +110,25 @@ def test_functions_are_arithmetic_alone() -> None:
     )  # the same bits everywhere
     with pytest.raises(IapbError, match=r"no value at t = 0\.5"):
         function_of("1/(t - 0.5)")(0.5)
+
+
+def test_threads_that_take_turns_while_they_read_expressions_do_not_disturb_each_other() -> None:
+    """What the collector calls lets them take turns: dask has such a callback."""
+
+    def take_turns(phase: str, info: Any) -> None:
+        time.sleep(0.0)
+
+    sources = [f"[{'(t + 1) * sin(t), ' * 20}{number}]" for number in range(50)]
+    threshold = gc.get_threshold()
+    gc.callbacks.append(take_turns)
+    gc.set_threshold(20)
+    try:
+        with ThreadPoolExecutor(2) as threads:
+            trees = list(threads.map(syntax_tree, sources + sources))
+    finally:
+        gc.set_threshold(*threshold)
+        gc.callbacks.remove(take_turns)
+    assert [len(tree.body[0].value.elts) for tree in trees] == [21] * 100
 
 
 def test_a_force_that_stops_being_a_number_ends_the_run_with_its_reason() -> None:
