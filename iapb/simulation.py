@@ -111,7 +111,7 @@ class Simulation:
             self.link = DeviceLink(device, self.world, self.state, self.port)
         self._planned = self.scene.hand is not None and self.scene.hand.changes
         self.steps_done = 0
-        self._first: list[np.ndarray] | None = None  # of `_rewind`
+        self._first: list[np.ndarray] | None = None  # of `rewind`
 
     @property
     def time(self) -> float:
@@ -161,7 +161,7 @@ class Simulation:
         Each call begins at the scene's start. The simulation needs a coupling; sensors and delay are
         the caller's.
         """
-        self._rewind()
+        self.rewind()
         forces = np.zeros(q.shape)
         status = 0
         if self.compiled:
@@ -181,13 +181,14 @@ class Simulation:
     def _read(self) -> Any:
         return Entry(read_device)
 
-    def _rewind(self) -> None:
-        """Return to the state in which this was called first."""
+    def rewind(self) -> None:
+        """Return to the state in which this was called first, at time 0."""
         arrays = self.state.arrays() + self.port.arrays()
         if self._first is None:
             self._first = [array.copy() for array in arrays]
         for array, first in zip(arrays, self._first, strict=True):
             array[...] = first
+        self.steps_done = 0
 
     def _do(self, parts: int) -> None:
         """Do parts of one step."""

@@ -47,12 +47,8 @@ class RecordedLoop:
     def sample(self) -> float:
         """Return the time per step of one whole run [s]; raise the error that stops the run before
         its end."""
-        simulation = self.simulation
-        system = self.simulation.system
-        simulation.state = system.make_state()
-        simulation.steps_done = 0
-        simulation.port = system.make_port(simulation.coupling)
-        self.recording = Recorder(simulation)
+        self.simulation.rewind()
+        self.recording = Recorder(self.simulation)
         total = 0.0
         while self.recording.steps < self.steps:
             stop, spent = timed(partial(self.recording.chunk, self.steps))
@@ -136,11 +132,7 @@ class OwnLoop:
         """Start from the first state, simulate until the scene is at rest, and return an empty
         record."""
         simulation = self.simulation
-        system = self.simulation.system
-        simulation.state, simulation.port = (
-            system.make_state(),
-            system.make_port(simulation.coupling),
-        )
+        simulation.rewind()
         simulation.advance_chunk(_record(simulation, self.settling), self.settling)
         return _record(simulation, self.steps)
 
@@ -235,10 +227,10 @@ def step_of_bodies(study: Study, n: int) -> Row:
     """Time the same steps several times; each chunk counts with its least time, as other processes
     only add time."""
     simulation = Simulation(scene_from_text(field_of_discs(n)))
-    simulation.advance_chunk(_record(simulation, 1), 1)  # compiles
+    simulation.rewind()
     quickest = [math.inf] * CHUNKS
     for _ in range(REPEATS):
-        simulation.state = simulation.system.make_state()
+        simulation.rewind()
         contacts = 0.0
         tested = 0.0
         for k in range(CHUNKS):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from iapb import find_scene, load_scene
+from iapb import find_scene, load_scene, simulate
 from iapb.scene import Scene, SpatialScene, scene_names
 from reference.worlds import find_world
 from verification.cost.effects import (
@@ -58,6 +58,8 @@ def test_an_effect_that_does_nothing_leaves_the_same_bits(name: str) -> None:
     world = find_world("IAPB")
     whole = Loop(scene, world)
     whole.sample()
+    timed = whole.recording.joined("steps")["q"]
+    assert np.array_equal(simulate(scene, world.law, world.coupling_in(scene)).q, timed)
     spatial = isinstance(scene, SpatialScene)
     idle = [
         switch
