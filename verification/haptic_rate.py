@@ -17,7 +17,7 @@ from reference.worlds import run_world
 from verification.check import Check, Study, Topic
 from verification.claims.speed import C19, C22
 from verification.cost import growth, impact_times, robots, steps
-from verification.cost.accuracy import BUDGET_ROWS, LEMKE
+from verification.cost.accuracy import LEMKE
 from verification.cost.calls import PRINTED
 from verification.cost.trajectories import MOTIONS, OURS, WORTH, aims
 from verification.finding import NOT_COMPUTED, REPRODUCED, Finding, Part
@@ -216,7 +216,6 @@ BENCH = Topic(
         replace(robots.ROBOTS, targets=no_targets),
         replace(MOTIONS, targets=motion_targets),
         replace(WORTH, targets=no_targets),
-        BUDGET_ROWS,
         EACH,
         RATIOS,
     ),

@@ -18,7 +18,7 @@ from verification.finding import NOT_COMPUTED, NOT_TESTABLE, REFUTED, REPRODUCED
 from verification.haptic_rate import haptic_study
 
 # tables that --json alone has
-LONG = ("motions", "C19", "C22", "budgets", "robots", "our time over theirs")
+LONG = ("motions", "C19", "C22", "robots", "our time over theirs")
 
 
 def bench(

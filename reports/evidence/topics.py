@@ -27,7 +27,7 @@ Progress = Callable[[int, int], None]
 # progress)
 TOPICS: dict[str, str] = {
     "hard-cases": "verification.hard_cases.topic:TOPIC",
-    "stability": "verification.stability.topic:contact_stability",
+    "stability": "verification.stability.topic:TOPIC",
     "complementarity": "verification.complementarity.topic:TOPIC",
     "haptic-rate": "verification.haptic_rate:TOPIC",
     "survival": "reports.evidence.survival:compute",

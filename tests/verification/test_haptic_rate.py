@@ -9,7 +9,7 @@ import pytest
 from verification.check import Study
 from verification.claims.speed import C19, C22
 from verification.cost import growth, impact_times, robots, steps
-from verification.cost.accuracy import BUDGET_ROWS, COMPILED, LEMKE, PYTHON
+from verification.cost.accuracy import COMPILED, LEMKE, PYTHON
 from verification.cost.trajectories import (
     BELOW,
     MOTIONS,
@@ -122,12 +122,6 @@ def _motions(**errors: tuple[float, ...]) -> Table:
     )
 
 
-def _budgets(gain: float = 0.0) -> Table:
-    return BUDGET_ROWS.table_of(
-        [{"budget [rows]": k, "largest relative gain": gain} for k in (0, 1)]
-    )
-
-
 def _whole(tables: Tables) -> Tables:
     study = Study(results={("table", key): table for key, table in tables.items()})
     return tables | {check.key: study.table(check) for check in DERIVED}
@@ -146,7 +140,6 @@ def tables() -> Tables:
         robots.ROBOTS.key: _robots(0.9),
         MOTIONS.key: motions,
         WORTH.key: WORTH.table_of([worth(motions, name) for name in names]),
-        BUDGET_ROWS.key: _budgets(),
     }
 
 
@@ -161,7 +154,6 @@ def tables() -> Tables:
         (steps.BODIES.key, _bodies(2.0, 1.0), 1),
         (steps.BODIES.key, _bodies(1.0, 2.0), 1),
         (robots.ROBOTS.key, _robots(2.0), 1),  # above the limit of many states alone
-        (BUDGET_ROWS.key, _budgets(1e-16), 1),
         (MOTIONS.key, _motions(IAPB=(1e-1, 1e-2), MuJoCo=(1e-1, 5e-3)), 2),
     ],
 )

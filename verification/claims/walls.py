@@ -19,13 +19,13 @@ from verification.port.kit import check_force
 from verification.region import Region
 from verification.scenes.measures import colliding_rows
 from verification.stability.walls import (
+    IMPULSES,
     PAPER_DAMPING,
     PENALTY,
     Floats,
     Loop,
     grid,
     loops,
-    maps_of,
     touch_walls,
 )
 from verification.table import Row
@@ -171,13 +171,13 @@ def _settling(study: Study, case: Case) -> Iterator[Row]:
     dampings = grid(study.depth)[1]
     raised = dampings[dampings >= PAPER_DAMPING]
     penalty, impulses = (
-        one.settles_after[dampings >= PAPER_DAMPING] for one in maps_of(loop, stiffness, dampings)
+        touch_walls(loop, stiffness, raised[:, None], law) for law in (PENALTY, IMPULSES)
     )
     best = penalty.argmin(axis=0)
     ours_best = impulses.argmin(axis=0)
     # the damping whose force at first contact equals the impulse's
     gain = (1.0 + loop.restitution) * loop.mass / loop.step
-    sustained = touch_walls(loop, stiffness, np.array(gain), PENALTY).settles_after
+    sustained = touch_walls(loop, stiffness, np.array(gain), PENALTY)
     for i, K in enumerate(stiffness):
         paper = (impulses[0, i], PAPER_DAMPING)
         tuned = (impulses[ours_best[i], i], raised[ours_best[i]])

@@ -18,7 +18,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from iapb import resolve_impact
 from iapb.errors import ArgumentError, IapbError, MissingDependencyError
 from reference.exact import relative_energy_gain
 from reference.one_thread import one_thread
@@ -26,8 +25,7 @@ from verification.check import Check, Study
 from verification.clock import sampler, seconds, take_turns
 from verification.cost import calls
 from verification.cost.calls import PRINTED, Call
-from verification.cost.problems import random_impact
-from verification.finding import Failure, Part, attempt, counted
+from verification.finding import Failure, attempt, counted
 from verification.impacts import TIMED_HARDNESS, Floats, ImpactCase, timed_problems
 from verification.table import Row, Table, table_from
 
@@ -451,52 +449,3 @@ def numbers_of(best: Table) -> Row:
         "largest_us": last[f"time, {COMPILED}"],
         "largest_error": max(row[f"largest error, {COMPILED}"] for row in ours),
     }
-
-
-TRUNCATED = ((6, 24), (12, 60), (30, 120))  # (d, c), rows of rank two thirds of d
-
-
-def stopped(study: Study, case: tuple[int, int, int]) -> Row:
-    """Resolve random plastic impacts of d coordinates and c contacts with a row budget and return
-    the worst and the typical of them."""
-    d, c, budget = case
-    impacts = [
-        random_impact(d, c, np.random.default_rng([0, d, c, k]), 0.0)
-        for k in range(40 if study.depth == "full" else 15)
-    ]
-    residuals = []
-    gains = []
-    lost = []
-    for one in impacts:
-        mass, rows, v = one.arrays
-        v_plus = resolve_impact(mass, rows, v, 0.0, budget=budget).velocity
-        full = resolve_impact(mass, rows, v, 0.0).velocity
-        residuals.append(one.unmet_restitution(v_plus))
-        gains.append(relative_energy_gain(mass, v, v_plus))
-        before, after, least = (0.5 * float(w @ mass @ w) for w in (v, v_plus, full))
-        lost.append((before - after) / (before - least))
-    return {
-        "coordinates": d,
-        "contacts": c,
-        "rank": impacts[0].rank,
-        "budget [rows]": budget,
-        "median residual": float(np.median(residuals)),
-        "largest residual": max(residuals),
-        "share of the loss": float(np.median(lost)),
-        "largest relative gain": max(gains),
-    }
-
-
-def budget_targets(table: Table) -> Iterator[Part]:
-    """Yield the number of combinations of size and row budget that add energy, judged exactly."""
-    gains = sum(gain > 0.0 for gain in table["largest relative gain"])
-    yield Part.on("sizes and row budgets that add energy", gains, 0)
-
-
-BUDGET_ROWS = Check(
-    key="budgets",
-    question="What does an impact give that stops early?",
-    row=stopped,
-    targets=budget_targets,
-    cases=lambda _: [(d, c, k) for d, c in TRUNCATED for k in range((2 * d) // 3 + 1)],
-)

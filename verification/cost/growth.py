@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import partial
-from itertools import pairwise
 
 import numpy as np
 
@@ -25,17 +24,6 @@ LARGEST_EXPONENT = 1.1  # target, over contacts
 def power_law(sizes: Sequence[float], values: Sequence[float]) -> float:
     """Return the slope of log(value) over log(size)."""
     return float(np.polyfit(np.log(sizes), np.log(values), 1)[0])
-
-
-def steepest(sizes: Sequence[float], values: Sequence[float]) -> tuple[float, float, float]:
-    """Return the two neighbouring sizes between which log(value) over log(size) is steepest, and
-    the slope there."""
-    pairs = sorted(zip(sizes, values, strict=True))
-    slope, low, high = max(
-        (power_law([low[0], high[0]], [low[1], high[1]]), low[0], high[0])
-        for low, high in pairwise(pairs)
-    )
-    return low, high, slope
 
 
 PAPER_STEP = "1/512 s, the paper's step"

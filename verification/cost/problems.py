@@ -13,12 +13,13 @@ _DRAWS = 1000  # most draws of a patch
 _AGREE = 1e-9
 
 
-def random_impact(d: int, c: int, rng: np.random.Generator, restitution: float = 0.5) -> ImpactCase:
-    """Return a random impact with c rows, whose rank is two thirds of d (or c, if this is less)."""
+def random_impact(d: int, c: int, rng: np.random.Generator) -> ImpactCase:
+    """Return a random impact with c rows, whose rank is two thirds of d (or c, if this is less), and
+    e = 1/2."""
     rank = max(1, (2 * d) // 3)
     root = rng.normal(size=(d, d))
     rows = rng.normal(size=(c, rank)) @ rng.normal(size=(rank, d))
-    return ImpactCase(root @ root.T + np.eye(d), rows, rng.normal(size=d), restitution, rank=rank)
+    return ImpactCase(root @ root.T + np.eye(d), rows, rng.normal(size=d), 0.5)
 
 
 def patch(contacts: int, rng: np.random.Generator) -> ImpactCase:

@@ -15,15 +15,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from reference import Floats
 
-PENALTY, IMPULSES = LAWS = ("penalty", "impulses")
-# the marks of a wall: the mass settles, keeps bouncing, moves ever more
-SETTLES = "+"
-BOUNCES_ON = "o"
-GROWS = "x"
+PENALTY = "penalty"
+IMPULSES = "impulses"
 PAPER_DAMPING = 50.0  # B of the paper's walls [N s/m]
 
 SETTLED_SPEED = 1e-3  # [m/s] as in the claims: a hundredth of the speed at contact
@@ -67,40 +63,13 @@ class Loop:
         """Step T [s]."""
         return 1.0 / self.rate
 
-    def passive_damping(self, stiffness: Floats) -> Floats:
-        """Largest virtual damping B that Colgate and Schenkel's condition b >= KT/2 + |B| allows;
-        if negative, none."""
-        return self.device_damping - 0.5 * stiffness * self.step
 
+def touch_walls(loop: Loop, stiffness: Floats, damping: Floats, law: str) -> Floats:
+    """Push the mass into each wall; return the time from the first contact to the last motion [s].
 
-@dataclass(frozen=True)
-class Contact:
-    """Outcome at each wall; every array has the shape of the walls.
-
-    settled : whether in the last quarter of the time the mass is still and never leaves the wall,
-        and has not grown
-    settles_after : time from the first contact to the last motion [s], infinite if it has not
-        settled
-    grown : whether the mass exceeds GROWN times its initial speed later than 1 s after the first
-        contact at any wall
-    penetration : largest penetration [m]
-    rate_hardness : first rate of the force over the first speed [N/m] (Lawrence et al. 2000)
-    """
-
-    settled: NDArray[np.bool_]
-    settles_after: Floats
-    grown: NDArray[np.bool_]
-    penetration: Floats
-    rate_hardness: Floats
-
-    @property
-    def outcomes(self) -> NDArray[np.str_]:
-        """SETTLES, BOUNCES_ON or GROWS for each wall."""
-        return np.where(self.grown, GROWS, np.where(self.settled, SETTLES, BOUNCES_ON))
-
-
-def touch_walls(loop: Loop, stiffness: Floats, damping: Floats, law: str) -> Contact:
-    """Push the mass into each wall and return the outcomes.
+    It is infinite if the mass has not settled: in the last quarter of the time it is not still, or
+    leaves the wall; or it exceeds GROWN times its initial speed later than 1 s after the first
+    contact at any wall.
 
     Parameters
     ----------
@@ -118,7 +87,7 @@ def touch_walls(loop: Loop, stiffness: Floats, damping: Floats, law: str) -> Con
         *[first] * (loop.delay + 1),
     ]  # those that are delayed, oldest first
     commands = [np.zeros(K.shape) for _ in range(loop.delay)]
-    positions, speeds, forces = (np.empty((steps, *K.shape)) for _ in range(3))
+    positions, speeds = (np.empty((steps, *K.shape)) for _ in range(2))
     free, moved, held = _held_force(loop)
     for k in range(steps):
         readings = [*readings[1:], np.round(x / r) * r if r > 0.0 else x.copy()]
@@ -138,8 +107,7 @@ def touch_walls(loop: Loop, stiffness: Floats, damping: Floats, law: str) -> Con
         v = np.where(diverged, 1e3, v)
         positions[k] = x
         speeds[k] = v
-        forces[k] = force
-    return _watched(loop, positions, speeds, forces)
+    return _settles_after(loop, positions, speeds)
 
 
 def _held_force(loop: Loop) -> tuple[float, float, float]:
@@ -157,7 +125,7 @@ def _held_force(loop: Loop) -> tuple[float, float, float]:
     return float(np.exp(-c)), float(phi), float((T - phi) * T / c)
 
 
-def _watched(loop: Loop, positions: Floats, speeds: Floats, forces: Floats) -> Contact:
+def _settles_after(loop: Loop, positions: Floats, speeds: Floats) -> Floats:
     steps = len(positions)
     time = loop.step * np.arange(1, steps + 1)
     inside = positions > 0.0
@@ -165,20 +133,11 @@ def _watched(loop: Loop, positions: Floats, speeds: Floats, forces: Floats) -> C
     moving = np.abs(speeds) > SETTLED_SPEED
     last_moving = np.where(moving.any(axis=0), steps - 1 - moving[::-1].argmax(axis=0), 0)
     left = inside[:-1] & ~inside[1:]
-    bouncing = left[round((1.0 - _LAST) * steps) :].any(
-        axis=0
-    )  # for ever, if slower than SETTLED_SPEED
-    settled = (last_moving < (1.0 - _LAST) * steps) & ~bouncing
+    at_the_end = round((1.0 - _LAST) * steps)
+    bouncing = left[at_the_end:].any(axis=0)  # for ever, if slower than SETTLED_SPEED
     grown = (np.abs(speeds[time > time[first].min() + 1.0]) > GROWN * loop.speed).any(axis=0)
-    first_force = np.take_along_axis(forces, (forces > 0.0).argmax(axis=0)[None], axis=0)[0]
-    settled &= ~grown
-    return Contact(
-        settled,
-        np.where(settled, np.maximum(time[last_moving] - time[first], 0.0), np.inf),
-        grown,
-        positions.max(axis=0, initial=0.0),
-        first_force / loop.step / loop.speed,
-    )
+    settled = (last_moving < (1.0 - _LAST) * steps) & ~bouncing & ~grown
+    return np.where(settled, np.maximum(time[last_moving] - time[first], 0.0), np.inf)
 
 
 def loops() -> tuple[Loop, ...]:
@@ -205,10 +164,3 @@ def grid(depth: str) -> tuple[Floats, Floats]:
     stiffnesses, dampings = GRIDS[depth]
     damping = np.concatenate([[0.0], np.geomspace(1.0, 3e3, dampings - 2), [PAPER_DAMPING]])
     return np.geomspace(1e2, 1e6, stiffnesses), np.sort(damping)
-
-
-def maps_of(loop: Loop, stiffness: Floats, damping: Floats) -> tuple[Contact, Contact]:
-    """Return the outcomes (m, k) with penalties and with impulses at m dampings and k
-    stiffnesses."""
-    penalty, impulses = (touch_walls(loop, stiffness, damping[:, None], law) for law in LAWS)
-    return penalty, impulses

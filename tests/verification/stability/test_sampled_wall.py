@@ -26,50 +26,22 @@ def test_motion_between_samples_is_that_of_the_differential_equation(b: float) -
     assert exact[1, 1:] == pytest.approx([free, moved], rel=1e-12)
 
 
-@pytest.mark.parametrize("law", study.LAWS)
-def test_a_stiff_undamped_wall_makes_the_hand_faster_and_a_soft_damped_one_holds(law: str) -> None:
-    assert at(study.Loop(), 1e6, 0.0, law).grown.all()
-    assert at(study.Loop(device_damping=5.0), 1000.0, 50.0, study.PENALTY).settled.all()
+@pytest.mark.parametrize("law", [study.PENALTY, study.IMPULSES])
+def test_a_stiff_undamped_wall_never_settles_and_a_soft_damped_one_does(law: str) -> None:
+    assert np.isinf(at(study.Loop(), 1e6, 0.0, law)).all()
+    assert np.isfinite(at(study.Loop(device_damping=5.0), 1000.0, 50.0, study.PENALTY)).all()
 
 
 def test_stiff_walls_at_1_khz_bounce_on_below_the_speed_of_rest() -> None:
     """Such walls do not count as stable, although the mass is slower than the speed of rest."""
-    short, long = (
-        at(study.Loop(rate=1000.0, seconds=seconds), 3e5, 0.0, study.IMPULSES)
-        for seconds in (3.0, 12.0)
-    )
-    for one in (short, long):
-        assert (one.outcomes == study.BOUNCES_ON).all() and np.isinf(one.settles_after).all()
+    for seconds in (3.0, 12.0):
+        loop = study.Loop(rate=1000.0, seconds=seconds)
+        assert np.isinf(at(loop, 3e5, 0.0, study.IMPULSES)).all()
 
 
-def test_a_plastic_impulse_stops_the_mass_on_touching() -> None:
-    loop = study.Loop(push=0.0)
-    contact = at(loop, 1000.0, 50.0, study.IMPULSES)
-    assert contact.penetration[0] <= 2.0 * loop.speed * loop.step
-    assert at(loop, 1000.0, 50.0, study.PENALTY).penetration[0] > 3.0 * contact.penetration[0]
-
-
-def test_rate_hardness_of_an_impulse_does_not_know_the_wall() -> None:
-    stiffness = np.array([100.0, 1e4])
-    hardness = study.touch_walls(
-        study.Loop(), stiffness, np.array([50.0, 50.0]), study.IMPULSES
-    ).rate_hardness
-    assert hardness[0] == pytest.approx(hardness[1], rel=1e-12)
-    theirs = study.touch_walls(
-        study.Loop(), stiffness, np.array([50.0, 50.0]), study.PENALTY
-    ).rate_hardness
-    assert theirs[1] > theirs[0]
-
-
-@pytest.mark.parametrize("law", study.LAWS)
-def test_no_wall_within_the_condition_makes_the_hand_faster(law: str) -> None:
-    loop = study.Loop(device_damping=5.0)
-    (stiffness, damping) = study.grid("quick")
-    outcomes = study.maps_of(loop, stiffness, damping)[study.LAWS.index(law)].outcomes
-    passive = loop.passive_damping(stiffness) >= damping[:, None]
-    if law == study.PENALTY:
-        assert passive.any() and not (outcomes[passive] == study.GROWS).any()
-    assert (outcomes[~passive] == study.GROWS).any()
+def test_a_plastic_impulse_settles_sooner_than_the_paper_s_damping() -> None:
+    loop = study.Loop()
+    assert at(loop, 1000.0, 50.0, study.IMPULSES) < at(loop, 1000.0, 50.0, study.PENALTY)
 
 
 def test_c20_holds_and_would_not_with_the_bound_in_the_wrong_place() -> None:
