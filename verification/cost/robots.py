@@ -17,7 +17,7 @@ from reference.random_mechanisms import random_state
 from reference.rigid_body import calls_from_urdf
 from verification.check import Check, Study
 from verification.clock import seconds, take_turns
-from verification.mechanics.against_pinocchio import SEED, SHIPPED, robot_files
+from verification.mechanics.against_pinocchio import SEED, robot_files, shipped_robots
 from verification.table import Row
 
 STATES = 200  # random states, one call each, in one round
@@ -25,8 +25,7 @@ ROUNDS = {"quick": 25, "full": 200}
 ONE = "one state per call"
 MANY = f"{STATES} states in one call"
 LIMITS = {ONE: 3.0, MANY: 1.0}  # target of the ratio
-OTHERS = robot_files()
-FILES = {path.stem: path for path in OTHERS or sorted((SHIPPED / "robots").glob("*.urdf"))}
+FILES = {path.stem: path for path in robot_files() or shipped_robots()}
 
 
 def time_robot(study: Study, name: str) -> Iterator[Row]:

@@ -1,9 +1,9 @@
 """Differences between the engine and Pinocchio: mechanisms over many random states, and impacts of
 independent rows; and between the engine and the references: mechanics and contacts of a scene.
 
-The mechanisms are random trees, trees with one kind of joint, the scenes, the project's robots and
-random URDF texts. Robots of other projects need a folder that is not part of this project. The
-engine and Pinocchio each read the URDF texts themselves.
+The mechanisms are random trees, trees with one kind of joint, the scenes and the project's robots.
+Robots of other projects need a folder that is not part of this project. The engine and Pinocchio
+each read the URDF texts themselves.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import product
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -25,7 +24,7 @@ from iapb.mechanics.mechanism import Mechanism
 from iapb.scene import load_scene
 from iapb.scene.mechanism import mechanism_of
 from reference import Floats
-from reference.random_mechanisms import random_inertia, random_mechanism, random_state
+from reference.random_mechanisms import random_mechanism, random_state
 from reference.rigid_body import (
     PinocchioMechanism,
     at_lever,
@@ -48,8 +47,6 @@ SEED = 20050602
 ROBOTS = Path(__file__).parents[3] / "shared" / "robots"
 SHIPPED = Path(__file__).parents[2] / "scenes"
 KIND_SIZES = (1, 6)  # number of joints of a tree with one kind of joint
-WRITTEN = {"quick": 4, "full": 40}  # URDF texts of each size
-WRITTEN_SIZES = (3, 8, 20)
 Pairs = list[tuple[Mechanism, PinocchioMechanism]]
 Pair = tuple[Any, Any]  # a quantity of ours, and of the reference
 
@@ -78,6 +75,11 @@ class Case:
         return f"{self.set}, {self.label}"
 
 
+def shipped_robots() -> list[Path]:
+    """Return the URDF files of the project."""
+    return sorted((SHIPPED / "robots").glob("*.urdf"))
+
+
 def robot_files() -> list[Path]:
     """Return the URDF files of robots of other projects; none without their folder."""
     return sorted(ROBOTS.glob("*.urdf"))
@@ -85,7 +87,6 @@ def robot_files() -> list[Path]:
 
 def _cases(study: Study) -> Iterator[Case]:
     count = TREES[study.depth]
-    written = WRITTEN[study.depth]
     for n in TREE_SIZES:
         yield Case(
             TREES_SET, f"trees of {n}", "random", [SEED, n], partial(_trees, n, count, tuple(KINDS))
@@ -98,19 +99,10 @@ def _cases(study: Study) -> Iterator[Case]:
     for path in sorted(SHIPPED.glob("*.yaml")):
         yield Case("scenes", path.stem, "of the scene", SEED, partial(_scene, path))
     bases = {"fixed": False, "floating": True}
-    for path, (base, floating) in product(
-        sorted((SHIPPED / "robots").glob("*.urdf")), bases.items()
-    ):
-        yield Case(
-            "URDF texts", path.stem, base, [SEED, floating], partial(_read, [path], floating)
-        )
-    for n, (base, floating) in product(WRITTEN_SIZES, bases.items()):
-        label = f"{written} random texts of {n} joints"
-        yield Case(
-            "URDF texts", label, base, [SEED, floating], partial(_written, n, written, floating)
-        )
-    for path, (base, floating) in product(robot_files(), bases.items()):
-        yield Case(OTHERS, path.stem, base, [SEED, floating], partial(_read, [path], floating))
+    robots = {"URDF texts": shipped_robots(), OTHERS: robot_files()}
+    for name, files in robots.items():
+        for path, (base, floating) in product(files, bases.items()):
+            yield Case(name, path.stem, base, [SEED, floating], partial(_read, path, floating))
 
 
 def _trees(joints: int, count: int, kinds: tuple[str, ...], rng: np.random.Generator) -> Pairs:
@@ -123,19 +115,8 @@ def _scene(path: Path, _: np.random.Generator) -> Pairs:
     return [(mechanism, model_of(mechanism))] if mechanism.nv else []
 
 
-def _read(files: list[Path], floating: bool, _: np.random.Generator) -> Pairs:
-    return [
-        (Mechanism.from_urdf(file, floating), model_from_urdf(file, floating)) for file in files
-    ]
-
-
-def _written(links: int, count: int, floating: bool, rng: np.random.Generator) -> Pairs:
-    texts = np.random.default_rng([SEED, links, 2])
-    with TemporaryDirectory() as scratch:
-        files = [Path(scratch) / f"random-{links}-{k}.urdf" for k in range(count)]
-        for file in files:
-            file.write_text(random_urdf(texts, links), encoding="utf-8")
-        return _read(files, floating, rng)
+def _read(file: Path, floating: bool, _: np.random.Generator) -> Pairs:
+    return [(Mechanism.from_urdf(file, floating), model_from_urdf(file, floating))]
 
 
 def _rows(_: Study, case: Case) -> Iterator[Row]:
@@ -157,54 +138,6 @@ def _rows(_: Study, case: Case) -> Iterator[Row]:
             **largest,
             "worst": max(largest.values()),
         }
-
-
-TYPES = ("revolute", "continuous", "prismatic", "floating", "fixed")
-
-
-def random_urdf(rng: np.random.Generator, links: int) -> str:
-    """Return the URDF text of a robot with a base and `links` more links, each attached to a random
-    earlier link.
-
-    It has every joint type but planar, whose coordinates differ between readers, rotated inertias,
-    and names whose order is not that of the lines.
-    """
-    names = [f"link_{k}" for k in rng.permutation(links + 1)]
-    joints = [f"joint_{k}" for k in rng.permutation(links)]
-    parts = [_link(rng, name) for name in names]
-    for k, joint in enumerate(joints, start=1):
-        parts.append(
-            _joint(rng, joint, TYPES[k % len(TYPES)], names[int(rng.integers(k))], names[k])
-        )
-    return "\n".join(['<robot name="random">', *parts, "</robot>"])
-
-
-def _link(rng: np.random.Generator, name: str) -> str:
-    mass = 10.0 ** rng.uniform(-1.0, 1.0)
-    inertia = random_inertia(rng, mass)
-    places = [(i, j) for i in range(3) for j in range(i, 3)]
-    entries = " ".join(f'i{"xyz"[i]}{"xyz"[j]}="{float(inertia[i, j])!r}"' for i, j in places)
-    return (
-        f'<link name="{name}"><inertial>{_origin(rng)}<mass value="{mass!r}"/>'
-        f"<inertia {entries}/></inertial></link>"
-    )
-
-
-def _joint(rng: np.random.Generator, name: str, kind: str, parent: str, child: str) -> str:
-    axis = rng.normal(size=3)
-    limits = '<limit lower="-3" upper="3" effort="10" velocity="10"/>'
-    return (
-        f'<joint name="{name}" type="{kind}">{_origin(rng)}<parent link="{parent}"/><child link="{child}"/>'
-        f'<axis xyz="{_numbers(axis)}"/>{limits}</joint>'
-    )
-
-
-def _origin(rng: np.random.Generator) -> str:
-    return f'<origin xyz="{_numbers(rng.normal(scale=0.3, size=3))}" rpy="{_numbers(rng.uniform(-3, 3, size=3))}"/>'
-
-
-def _numbers(values: Floats) -> str:
-    return " ".join(repr(float(value)) for value in values)
 
 
 def compare(

@@ -27,11 +27,10 @@ ARM = """<robot name="arm">
 
 @pytest.fixture(autouse=True)
 def few(monkeypatch, tmp_path):
-    """Few states and texts; one robot in the folder."""
+    """Few states; one robot in the folder."""
     for name, value in (
         ("STATES", 2),
         ("TREES", {"quick": 1}),
-        ("WRITTEN", {"quick": 1}),
         ("ROBOTS", tmp_path),
     ):
         monkeypatch.setattr(study, name, value)
