@@ -154,9 +154,7 @@ EXTRAS = {
         ),
         "reference",
     ),
-    **dict.fromkeys(
-        ("hypothesis", "sympy", "flint", "typer", "rich", "xarray", "h5netcdf"), "verify"
-    ),
+    **dict.fromkeys(("sympy", "flint", "typer", "rich", "xarray", "h5netcdf"), "verify"),
     **dict.fromkeys(("matplotlib", "jinja2", "latex2mathml", "viser"), "report"),
 }
 

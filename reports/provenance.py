@@ -31,7 +31,6 @@ PEERS = (
     "quantecon",
     "sympy",
     "python-flint",
-    "hypothesis",
     "mujoco",
 )
 UNKNOWN = "unknown"

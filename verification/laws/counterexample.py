@@ -125,17 +125,12 @@ class Hunt:
         answers = (answer_of(self.child, pickle.loads(call)) for call in earlier)
         return not any(isinstance(answer, ResolverFault) for answer in answers)
 
-    def smallest(
-        self,
-        drawn: Sequence[ImpactCase],
-        search: Callable[[Callable[[ImpactCase], bool]], ImpactCase | None],
-    ) -> ImpactCase | None:
+    def smallest(self, drawn: Sequence[ImpactCase]) -> ImpactCase | None:
         """Return a small impact that a fresh resolver fails; None if there is none without earlier
         calls."""
         for least in (NOTABLE, 0.0):
             fails = partial(self.breaks, least=least)
-            found = search(fails)
-            failing = [case for case in (found, *drawn) if case is not None and fails(case)]
+            failing = [case for case in drawn if fails(case)]
             if not failing:
                 continue
             smallest = shrink(min(failing, key=_size), fails)
