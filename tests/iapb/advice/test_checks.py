@@ -81,7 +81,7 @@ duration: 0.1
 bodies:
   - {name: box, joint: planar, mass: 1, inertia: 0.01, position: [0, 0.3, 45],
      shapes: [{kind: box, size: [0.1, 0.1], angle: -30}]}
-  - {name: arm, joint: revolute, mass: 1, inertia: 0.01, position: [10], joint_limits: [-90, 20]}
+  - {name: arm, joint: revolute, mass: 1, inertia: 0.01, position: [10], joint_limits: [-45, 20]}
 walls:
   - {name: block, kind: box, size: [1, 0.1], center: [0, -1], angle: 7}
 """,
