@@ -37,13 +37,11 @@ def dry_friction(x, v):
 WALL.reset(T)
 # law, periods of delay, least damping without friction
 DAMPINGS = {
-    "spring": (Linear(), 0, K * T / 2),
     "spring and damper": (WALL, 0, K * T / 2 + B),
     "negative damper": (Linear(K, -B), 0, K * T / 2 + B),
     "one-sided": (PenaltyWall(K, B), 0, K * T / 2 + B),
     "clamped": (clamped, 0, K * T / 2 + B),
     "two periods late": (Linear(), 2, 2.5 * K * T),
-    "late, with a damper": (WALL, 1, WALL.need(BareDevice(delay=1))),
     "filter": (Linear(K, B, 3e-3), 0, K * T / 2 + B * T / (T + 6e-3)),
     "every second period": (truths.Renewed, 0, K * T),
     "potential": (Linear(HESSIAN), 0, T / 2 * np.linalg.eigvalsh(HESSIAN)[-1]),

@@ -2,73 +2,32 @@
 
 from __future__ import annotations
 
-from typing import Any
+from pathlib import Path
 
 import numpy as np
 import pytest
+from ruamel.yaml import YAML
 
 from iapb.run import Run
 from iapb.scene import Scene
 from iapb.scene.mechanism import mechanism_of
+from iapb.scene.reading import scene_from_values
 from iapb.simulation import simulate
-from tests.iapb.contact.paper import scene_of
 
-
-def scene(*bodies: dict[str, Any], **values: Any) -> Scene:
-    return scene_of(list(bodies), [], **{"duration": 1.0} | values)
-
-
-def body(spin: float, **values: Any) -> dict[str, Any]:
-    return {
-        "name": "body",
-        "joint": "free_flyer",
-        "mass": 1.3,
-        "inertia": [1e-3, 2e-3, 2.5e-3],
-        "velocity": [3.0, 0.0, -1.0, 0.3 * spin, 0.8 * spin, 0.5 * spin],
-    } | values
-
-
-LINK = {
-    "joint": "revolute",
-    "mass": 0.4,
-    "center_of_mass": [0.1, 0, 0],
-    "inertia": [1e-4, 2e-3, 2e-3],
-}
-ROBOT = (
-    body(3.0, center_of_mass=[0.02, 0.01, -0.03]),
-    LINK
-    | {
-        "name": "one",
-        "parent": "body",
-        "axis": [0, 0.6, 0.8],
-        "origin": [0.1, 0, 0],
-        "velocity": [5.0],
-    },
-    LINK
-    | {
-        "name": "two",
-        "parent": "one",
-        "axis": [1, 0, 1],
-        "origin": [0.2, 0, 0],
-        "velocity": [-8.0],
-    },
-)
-FLAT = {"joint": "revolute", "mass": 0.4, "center_of_mass": [0.1, 0], "inertia": 2e-3}
-FLAT_ROBOT = (
-    {"name": "body", "joint": "planar", "mass": 1.0, "inertia": 1e-2, "velocity": [1.0, -2.0, 4.0]},
-    FLAT | {"name": "one", "parent": "body", "origin": [0.1, 0], "velocity": [5.0]},
-    FLAT | {"name": "two", "parent": "one", "origin": [0.2, 0], "velocity": [-9.0]},
-)
+GIVEN = YAML(typ="safe").load(Path(__file__).with_name("free_motion.yaml"))
+BODY = scene_from_values(GIVEN["body"])
+PLANE = scene_from_values(GIVEN["robot in the plane"])
+TURNED = [[2e-3, 3e-4, 1e-4], [3e-4, 2e-3, -2e-4], [1e-4, -2e-4, 3e-3]]
 CASES = {
-    "a body at 1000 rad/s": scene(body(1000.0), duration=0.2),
-    "its centre elsewhere": scene(body(50.0, center_of_mass=[0.1, -0.2, 0.05])),
-    "turned inertia": scene(
-        body(50.0, inertia=[[2e-3, 3e-4, 1e-4], [3e-4, 2e-3, -2e-4], [1e-4, -2e-4, 3e-3]])
+    "a body at 1000 rad/s": BODY.with_values(
+        {"duration": 0.2, "bodies.body.velocity": [3, 0, -1, 300, 800, 500]}
     ),
-    "a floating robot": scene(*ROBOT),
-    "a planar one": scene(*FLAT_ROBOT),
+    "its centre elsewhere": BODY.with_values({"bodies.body.center_of_mass": [0.1, -0.2, 0.05]}),
+    "turned inertia": BODY.with_values({"bodies.body.inertia": TURNED}),
+    "a floating robot": scene_from_values(GIVEN["robot"]),
+    "a planar one": PLANE,
 }
-LIMITED = scene(FLAT_ROBOT[0], *(link | {"joint_limits": [-0.3, 0.3]} for link in FLAT_ROBOT[1:]))
+LIMITED = PLANE.with_values({f"bodies.{name}.joint_limits": [-0.3, 0.3] for name in ("one", "two")})
 
 
 def momenta(run: Run, given: Scene) -> np.ndarray:
