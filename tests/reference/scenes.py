@@ -1,46 +1,20 @@
-"""Scenes of these tests, made of their bodies."""
+"""Scenes of these tests, from scenes.yaml."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
-from iapb.scene import Scene, SpatialScene
+from ruamel.yaml import YAML
+
+from iapb.scene import Scene
+from iapb.scene.reading import scene_from_values
 
 G = 9.81
+GIVEN = YAML(typ="safe").load(Path(__file__).with_name("scenes.yaml"))["scenes"]
 
 
-def scene_of(
-    *bodies: dict[str, Any],
-    space: bool = True,
-    gravity: float = 0.0,
-    floor: float | None = None,
-    **given: Any,
-) -> Any:
-    """Return a scene of free bodies of 1 kg at 1 kHz, by default; `floor`: its height."""
-    down = [0.0, 0.0, -1.0] if space else [0.0, -1.0]
-    kind = "half_space" if space else "half_plane"
-    walls = (
-        []
-        if floor is None
-        else [
-            {
-                "name": "floor",
-                "kind": kind,
-                "point": [-floor * x for x in down],
-                "normal": [-x for x in down],
-            }
-        ]
-    )
-    own = {"joint": "free_flyer" if space else "planar", "mass": 1.0}
-    return (SpatialScene if space else Scene).model_validate(
-        {
-            "name": "made",
-            "rate": 1000.0,
-            "duration": 10.0,
-            "gravity": [gravity * x for x in down],
-            "walls": walls,
-            "bodies": [{"name": f"body_{k}"} | own | body for k, body in enumerate(bodies)],
-        }
-        | ({"dimensions": 3} if space else {})
-        | given
-    )
+def scene_of(name: str, **values: Any) -> Scene:
+    """Return a scene by name; values by their paths, with __ for each dot."""
+    changed = {path.replace("__", "."): value for path, value in values.items()}
+    return scene_from_values(GIVEN[name]).with_values(changed)

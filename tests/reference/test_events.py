@@ -9,31 +9,12 @@ import numpy as np
 import pytest
 
 from iapb.errors import ArgumentError, SolverError
-from iapb.scene import Scene, find_scene, load_scene, scene_from_text
+from iapb.scene import find_scene, load_scene
 from reference.scene_events import scene_truth
 from reference.worlds import run_world
 from tests.reference.scenes import G, scene_of
 
-DROP = scene_of(
-    {
-        "mass": 0.5,
-        "inertia": [2e-4] * 3,
-        "shapes": [{"kind": "sphere", "radius": 0.04}],
-        "position": [0, 0, 0.24, 0, 0, 0, 1],
-        "velocity": [0.3, 0, 0, 2, 3, 1],
-    },
-    gravity=G,
-    floor=0.0,
-    contact={"restitution": 0.6},
-)
-ARM = {
-    "joint": "revolute",
-    "axis": [0, 1, 0],
-    "mass": 2,
-    "inertia": [1e-3, 0.03, 0.03],
-    "center_of_mass": [0.2, 0, 0],
-    "shapes": [{"kind": "sphere", "radius": 0.05, "center": [0.4, 0, 0]}],
-}
+DROP = scene_of("dropped ball")
 
 
 def test_a_dropped_ball_is_the_ball_of_the_exact_events() -> None:
@@ -61,8 +42,7 @@ def test_an_arm_strikes_its_one_contact_with_the_speed_that_its_energy_says(
 ) -> None:
     """½ I ω² = m g l sin(angle) at sin(angle) = 0.2/0.4; then −e ω, or rest with the gap held
     closed."""
-    scene = scene_of(ARM, gravity=G, floor=-0.25, contact={"restitution": restitution})
-    truth = scene_truth(scene, 0.3)
+    truth = scene_truth(scene_of("arm", contact={"restitution": restitution}), 0.3)
     inertia = 0.03 + 2.0 * 0.2**2
     angle = np.arcsin(0.5)
     speed = np.sqrt(2.0 * 2.0 * G * 0.2 * np.sin(angle) / inertia)
@@ -76,21 +56,10 @@ def test_an_arm_strikes_its_one_contact_with_the_speed_that_its_energy_says(
         assert q == pytest.approx(angle, abs=1e-9) and np.abs(v).max() <= 1e-9
 
 
-def bouncing(restitution: float) -> Scene:
-    ball = {
-        "mass": 0.5,
-        "inertia": 2e-4,
-        "shapes": [{"kind": "circle", "radius": 0.04}],
-        "position": [0, 0.09, 0],
-        "velocity": [0.3, 0, 0],
-    }
-    return scene_of(ball, space=False, gravity=G, floor=0.0, contact={"restitution": restitution})
-
-
 def test_bounces_that_accumulate_end_in_a_lasting_contact() -> None:
     """A ball from 5 cm, e = 0.5: it rests after 3 sqrt(2 h/g), infinitely many bounces later, and
     then slides on."""
-    truth = scene_truth(bouncing(0.5), 1.0)
+    truth = scene_truth(scene_of("bouncing"), 1.0)
     rests = 3.0 * np.sqrt(2.0 * 0.05 / G)
     falls = rests / 3.0 * (1.0 + 2.0 * (1.0 - 0.5 ** np.arange(len(truth.events))))
     assert truth.events == pytest.approx(falls, abs=2.0 * truth.bound.instant)
@@ -105,18 +74,20 @@ def test_bounces_that_accumulate_end_in_a_lasting_contact() -> None:
 
 
 def test_the_bound_holds_all_the_bounces_that_are_neglected() -> None:
-    low = {"bodies.body_0.position": [0, 0.04, 0], "bodies.body_0.velocity": [0, -1e-3, 0]}
-    height = (0.5e-3) ** 2 / (2.0 * G)  # of the first one
-    assert scene_truth(bouncing(0.5).with_values(low), 0.05).bound.position >= 2.0 * height / (
-        1.0 - 0.25
+    low = scene_of(
+        "bouncing",
+        bodies__ball__position=[0, 0.04, 0],
+        bodies__ball__velocity=[0, -1e-3, 0],
     )
+    height = (0.5e-3) ** 2 / (2.0 * G)  # of the first one
+    assert scene_truth(low, 0.05).bound.position >= 2.0 * height / (1.0 - 0.25)
 
 
 @pytest.mark.parametrize(
     ("given", "error", "says"),
     [
         (
-            (lambda: DROP.with_values({"hand": {"body": "body_0"}}), 0.1, True),
+            (lambda: DROP.with_values({"hand": {"body": "ball"}}), 0.1, True),
             ArgumentError,
             "a scene without quaternions",
         ),
@@ -125,7 +96,11 @@ def test_the_bound_holds_all_the_bounces_that_are_neglected() -> None:
             SolverError,
             "box_stack: .* contacts overlap",
         ),
-        ((lambda: bouncing(0.97), 6.0, False, 20), SolverError, "impacts accumulate, 20 before"),
+        (
+            (lambda: scene_of("bouncing", contact__restitution=0.97), 6.0, False, 20),
+            SolverError,
+            "impacts accumulate, 20 before",
+        ),
     ],
 )
 def test_refusals(given: Any, error: type[Exception], says: str) -> None:
@@ -134,32 +109,16 @@ def test_refusals(given: Any, error: type[Exception], says: str) -> None:
         scene_truth(make(), *options)
 
 
-LIMITED = """
-name: arm
-rate: 2000
-duration: 0.6
-gravity: [0, -9.81]
-bodies:
-  - {name: upper, joint: revolute, mass: 1.0, inertia: 0.01, center_of_mass: [0.2, 0], joint_limits: [-0.5, 1.0],
-     joint_damping: 0.3}
-  - {name: lower, parent: upper, joint: revolute, origin: [0.4, 0], mass: 0.5, inertia: 0.005,
-     center_of_mass: [0.15, 0], joint_limits: [-0.6, 0.4], velocity: [3.0]}
-contact: {stiffness: 2e5, damping: 60, restitution: 0.0}
-"""
-
-
-def limited_arm(**values: object) -> Scene:
-    return scene_from_text(LIMITED).with_values(values)
-
-
 def test_a_device_like_its_tool_goes_with_it_where_velocities_make_forces() -> None:
     gains = {"four_channel": {"stiffness": [10, 10], "damping": [1, 1]}}
-    arm = limited_arm(
+    arm = scene_of(
+        "limited arm",
         gravity=[0, 0],
         device={},
         hand={"body": "lower"},
         couplings=gains,
-        **{"bodies.upper.joint_damping": 0, "bodies.lower.position": [-0.3]},
+        bodies__upper__joint_damping=0,
+        bodies__lower__position=[-0.3],
     )
     tool_and_device = scene_truth(arm, 0.2, coupled=True).segments[0][2](0.1)
     assert tool_and_device[:4] == pytest.approx(tool_and_device[4:], abs=1e-8)
@@ -167,11 +126,16 @@ def test_a_device_like_its_tool_goes_with_it_where_velocities_make_forces() -> N
 
 @pytest.mark.parametrize("world", ["IAPB", "ideal"])
 def test_damped_and_limited_joints_converge_to_the_event_driven_truth(world: str) -> None:
-    truth = scene_truth(limited_arm(), 0.6)
+    truth = scene_truth(scene_of("limited arm"), 0.6)
     errors = []
     assert len(truth.events) >= 2  # both joints meet a limit
     for rate in (1000.0, 4000.0):
-        stiffness = {"contact.forces": "paper", "contact.stiffness": 5e4 * rate / 1000.0}
-        run = run_world(limited_arm(rate=rate, **stiffness), world)
+        scene = scene_of(
+            "limited arm",
+            rate=rate,
+            contact__forces="paper",
+            contact__stiffness=5e4 * rate / 1000.0,
+        )
+        run = run_world(scene, world)
         errors.append(float(np.abs(run.q - truth.state(run.time)[0]).max()))
     assert errors[1] < 0.5 * errors[0] < (0.005 if world == "ideal" else 0.05)  # springs sag, too

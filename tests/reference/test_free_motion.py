@@ -7,7 +7,6 @@ The truth of events has no friction, so only the world "ideal-friction" is asked
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -68,12 +67,6 @@ def test_floating_trees_that_turn_keep_momentum_and_energy() -> None:
 
 
 RADIUS = 0.0285
-BALL: dict[str, Any] = {
-    "mass": 0.17,
-    "inertia": [0.4 * 0.17 * RADIUS**2] * 3,
-    "position": [0, 0, RADIUS, *UPRIGHT],
-    "shapes": [{"kind": "sphere", "radius": RADIUS}],
-}
 
 
 @pytest.mark.parametrize(("turning", "share"), [(2.0 / RADIUS, 1.0), (-2.0 / RADIUS, 3.0 / 7.0)])
@@ -83,16 +76,8 @@ def test_a_billiard_ball_ends_rolling(turning: float, share: float) -> None:
 
     Sliding ends within a step of 1 ms, so the way errs by at most μ g Δt²/8.
     """
-    run = simulate(
-        scene_of(
-            BALL | {"velocity": [2, 0, 0, 0, turning, 0]},
-            gravity=G,
-            floor=0.0,
-            contact={"restitution": 0.0, "friction": 0.2},
-        ),
-        RigidConstraints(friction="coulomb"),
-        steps=650,
-    )
+    scene = scene_of("billiard ball", bodies__ball__velocity=[2, 0, 0, 0, turning, 0])
+    run = simulate(scene, RigidConstraints(friction="coulomb"), steps=650)
     slid = (2.0 - 2.0 * share) ** 2 / (2.0 * 0.2 * G)
     assert run.q[-1, :3] == pytest.approx(
         [0.65 * 2.0 * share + slid, 0.0, RADIUS], abs=1e-9 + 0.2 * G * 1e-6 / 8.0
@@ -114,13 +99,7 @@ def test_an_eccentric_disc_that_turns_fast_stays_on_the_floor() -> None:
     radius = 0.05
     arm = 0.01
     gravity = 0.024 * spin**2
-    disc = {
-        "inertia": inertia,
-        "position": [0, radius, 0],
-        "velocity": [0, -arm * spin, spin],
-        "shapes": [{"kind": "circle", "radius": radius, "center": [arm, 0]}],
-    }
-    scene = scene_of(disc, space=False, gravity=gravity, floor=0.0, contact={"restitution": 0.0})
+    scene = scene_of("eccentric disc")
     _, q, v = by_events(scene, 10.0 / spin)
     angle = q[:, 2]
     rate = v[:, 2]

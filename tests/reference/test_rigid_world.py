@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from iapb.errors import ArgumentError, SolverError
 from iapb.run import COLLIDING, FREE, RESTING
-from iapb.scene import Scene, find_scene, load_scene
+from iapb.scene import find_scene, load_scene
 from iapb.simulation import simulate
 from iapb.system import System
 from reference import rigid_step as stepping
@@ -27,7 +27,7 @@ from reference.rigid_step import (
 )
 from reference.time_stepping import RigidConstraints
 from reference.worlds import find_world, run_world
-from tests.reference.scenes import scene_of
+from tests.reference.scenes import GIVEN, scene_of
 from verification.certificate import certify
 
 DT = 1.0 / 512
@@ -153,13 +153,7 @@ def test_steps_never_gain(equal: float | None, seed: int) -> None:
 
 def test_a_box_slides_straight_and_stops() -> None:
     """v²/(2 μ g) = 21 mm along (0.6, 0.8)."""
-    plate = {
-        "inertia": [4e-4] * 3,
-        "shapes": [{"kind": "box", "size": [0.2, 0.2, 0.02]}],
-        "position": [0, 0, 0.01, 0, 0, 0, 1],
-        "velocity": [0.3, 0.4, 0, 0, 0, 0],
-    }
-    scene = scene_of(plate, gravity=9.81, floor=0.0, contact={"restitution": 0, "friction": 0.6})
+    scene = scene_of("plate")
     run = simulate(scene, RigidConstraints(friction="coulomb"), steps=110)
     way = 0.5**2 / (2.0 * 0.6 * 9.81) * np.array([0.6, 0.8])
     assert run.q[-1, :2] == pytest.approx(way, abs=2e-3) and np.abs(run.v[-1]).max() < 2e-2
@@ -248,13 +242,7 @@ def test_the_bar_on_two_posts_gains_nothing_and_follows_poissons_law() -> None:
 def test_a_blow_through_resting_balls_is_one_impact_and_a_load_elsewhere_is_none() -> None:
     """One of three equal balls strikes two that touch, e = 0: they go on at a third, 1/3 J is lost;
     two stand apart."""
-    ball = {"joint": "prismatic", "axis": [1, 0], "shapes": [{"kind": "circle", "radius": 0.1}]}
-    line = [
-        ball | {"position": [x], "velocity": [float(x == 0.0)]} for x in (0.0, 0.2, 0.4, 5.0, 5.2)
-    ]
-    scene = scene_of(
-        *line, space=False, contact={"restitution": 0}, hand={"body": "body_3", "force": [3, 0, 0]}
-    )
+    scene = scene_of("balls")
     run = simulate(scene, RigidConstraints(), steps=5)
     assert len(run.impacts.step) == 1 and run.impacts.energy_lost[0] == pytest.approx(
         1.0 / 3.0, rel=1e-12
@@ -270,24 +258,15 @@ def test_a_blow_through_resting_balls_is_one_impact_and_a_load_elsewhere_is_none
 
 # --- cost
 # ---------------------------------------------------------------------------------------------------------
-def row(count: int) -> Scene:
-    """Discs in a row on a floor."""
-    disc = {"shapes": [CIRCLE], "inertia": 1e-3}
-    bodies = (disc | {"position": [0.12 * i, 0.05, 0.0]} for i in range(count))
-    return scene_of(*bodies, space=False, floor=0.0, duration=0.003)
-
-
-CIRCLE = {"kind": "circle", "radius": 0.05}
-
-
 def test_too_many_are_refused_before_the_first_step(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(time_stepping, "MOST_ENTRIES", 500)
-    assert run_world(row(4), "ideal").complete
+    few = scene_of("row", bodies=GIVEN["row"]["bodies"][:4])
+    assert run_world(few, "ideal").complete
     for world in ("ideal", "ideal-friction"):
         with pytest.raises(
             ArgumentError, match=r"at most 500 numbers .* 36 contacts of 24 coordinates have 864"
         ):
-            run_world(row(8), world)
+            run_world(scene_of("row"), world)
 
 
 PEG = load_scene(find_scene("peg_corner"))
@@ -314,33 +293,19 @@ def test_worlds_that_cannot_be_are_refused(call: Callable[[], Any], says: str) -
 
 # --- order of the rigid worlds
 # ------------------------------------------------------------------------------------
-PENDULUM: dict[str, Any] = {
-    "joint": "revolute",
-    "inertia": 0.02,
-    "center_of_mass": [0.3, 0.0],
-    "velocity": [1.0],
-}
-EDGE: dict[str, Any] = {  # a box that stands on its edge, and falls
-    "inertia": 2e-3,
-    "shapes": [{"kind": "box", "size": [0.1, 0.1]}],
-    "position": [0.0, 0.05 * (np.sin(0.6) + np.cos(0.6)), 0.6],
-}
-
-
 @pytest.mark.parametrize(
-    ("body", "options", "least"),
+    ("name", "values", "least"),
     [
-        (PENDULUM, {}, 3.9),
-        (PENDULUM | {"joint_damping": 0.5}, {}, 3.9),
-        (EDGE, {"floor": 0.0}, 3.5),
+        ("pendulum", {}, 3.9),
+        ("pendulum", {"bodies__rod__joint_damping": 0.5}, 3.9),
+        ("edge", {}, 3.5),
     ],
-    ids=["pendulum", "damped", "slides"],
 )
-def test_smooth_motion_is_of_order_two(body: Any, options: Any, least: float) -> None:
+def test_smooth_motion_is_of_order_two(name: str, values: Any, least: float) -> None:
     """Half the step leaves a quarter of the change that the step before left."""
     ends = []
     for rate in (500.0, 1000.0, 2000.0):
-        scene = scene_of(body, space=False, gravity=9.81, duration=0.1, rate=rate, **options)
+        scene = scene_of(name, rate=rate, **values)
         ends.append(run_world(scene, "ideal-friction").q[-1])
     apart = np.abs(np.diff(ends, axis=0)).max(axis=1)
     assert apart[0] > least * apart[1]
@@ -348,10 +313,9 @@ def test_smooth_motion_is_of_order_two(body: Any, options: Any, least: float) ->
 
 def test_a_scene_with_a_hand_keeps_its_step() -> None:
     """A fall within a step is exact without a hand, and of first order with one."""
-    falls = {"inertia": 1.0, "velocity": [0, -1, 0], "position": [0, 0.1, 0]}
-    held = {"hand": {"body": "body_0"}}
+    held = {"hand": {"body": "body"}}
     for given_, late in (({}, 0.0), (held, 0.5 * 9.81 * 1e-3 * 0.1)):
-        scene = scene_of(falls, space=False, gravity=9.81, duration=0.1, **given_)
+        scene = scene_of("fall", **given_)
         exact = -0.5 * 9.81 * 0.1**2
         assert run_world(scene, "ideal").q[-1, 1] == pytest.approx(exact - late, rel=1e-12)
 
