@@ -58,10 +58,10 @@ def test_one_mass_by_hand(gap: float, e: float, options: Any, expected: float) -
     assert result.impulse[0] == pytest.approx(2.0 * (1.0 + result.velocity[0]), abs=1e-14)
 
 
-@given(st.integers(0, 10_000))
-def test_every_step_satisfies_its_conditions(seed: int) -> None:
-    """Feasible, non-adhesive, complementary, dynamics kept; a plastic closed step without load
-    never gains energy."""
+@pytest.mark.parametrize("equal", [0.0, 0.3, 1.0, None])
+@given(seed=st.integers(0, 10_000))
+def test_every_step_satisfies_its_conditions(equal: float | None, seed: int) -> None:
+    """Feasible, non-adhesive, dynamics kept; a closed step without load never gains energy."""
     rng = np.random.default_rng(seed)
     d = int(rng.integers(1, 7))
     c = int(rng.integers(1, 9))
@@ -69,16 +69,15 @@ def test_every_step_satisfies_its_conditions(seed: int) -> None:
     mass = root @ root.T + 0.1 * np.eye(d)
     v = rng.normal(size=d)
     rows = rng.normal(size=(c, d)) @ np.diag(rng.integers(0, 2, size=d))
-    gap = rng.choice([-1e-3, 0.0, 1e-4], size=c)
-    result = step(mass, v, np.zeros(d), rows, gap, 0.0)
+    gap = rng.choice([-1e-3, 0.0, 1e-4], size=c) if equal == 0.0 else np.zeros(c)
+    e = rng.choice([0.0, 0.3, 1.0], size=c) if equal is None else equal
+    result = step(mass, v, np.zeros(d), rows, gap, e)
     bound = velocity_bounds(gap, rows @ v, 0.0, DT)
     scale = np.abs(rows).max() * max(np.abs(v).max(), np.abs(result.velocity).max()) + 1.0
     assert (rows @ result.velocity - bound).min() >= -1e-9 * scale and result.impulse.min() >= 0.0
     left = mass @ (result.velocity - v) - rows.T @ result.impulse
-    assert (
-        np.abs(left).max() <= 1e-9 * scale * np.abs(mass).max()
-        and result.residual <= stepping.STEP_TOLERANCE
-    )
+    assert np.abs(left).max() <= 1e-9 * scale * np.abs(mass).max()
+    assert result.residual <= stepping.STEP_TOLERANCE
     if gap.max() <= 0.0:
         assert result.velocity @ mass @ result.velocity <= (1.0 + 1e-12) * (v @ mass @ v)
 
@@ -133,22 +132,6 @@ def test_each_contact_returns_its_own_share(e: tuple[float, float]) -> None:
     """A bar falls flat on its two ends: J v⁺ = −E J v⁻ at both, by Newton's law."""
     found = step(BAR, [-1.0, 0.0], [0.0, 0.0], ENDS, [0.0, 0.0], np.array(e))
     assert ENDS @ found.velocity == pytest.approx(e, abs=1e-14)
-
-
-@pytest.mark.parametrize("equal", [0.3, 0.7, 1.0, None])
-@given(seed=st.integers(0, 10_000))
-def test_steps_never_gain(equal: float | None, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    d = int(rng.integers(1, 7))
-    c = int(rng.integers(2, 7))
-    root = rng.normal(size=(d, d))
-    rows = rng.normal(size=(c, d))
-    v = rng.normal(size=d)
-    mass = root @ root.T + 0.1 * np.eye(d)
-    e = rng.choice([0.0, 0.3, 1.0], size=c)
-    found = step(mass, v, np.zeros(d), rows, np.zeros(c), e if equal is None else equal)
-    assert found.velocity @ mass @ found.velocity <= (1.0 + 1e-9) * (v @ mass @ v)
-    assert (rows @ found.velocity).min() >= -1e-8 * np.abs(rows).max() * np.abs(v).max() * d
 
 
 def test_a_box_slides_straight_and_stops() -> None:
