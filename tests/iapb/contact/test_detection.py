@@ -1,17 +1,18 @@
-"""Contacts of shapes against support functions and coal; bits that order and place must not
+"""Contacts of shapes against support functions; bits that order and place must not
 change."""
 
 from __future__ import annotations
 
 from collections import Counter
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from ruamel.yaml import YAML
 
 from iapb.contact import finding
 from iapb.contact.finding import ContactFinder
-from iapb.contact.geometry import BOX, Shape, candidate_pairs, make_shapes
 from iapb.contact.kernels import broadphase
 from iapb.scene import Scene
 from iapb.simulation import simulate
@@ -130,32 +131,6 @@ def test_contacts_of_a_crowd_are_those_of_support_functions(space: bool, margin:
     assert counts >= ({1, 3, 4, 8} if space and margin > 1.0 else {1, 2})
 
 
-def test_boxes_in_space_overlap_as_coal_says() -> None:
-    """Depth of two boxes at random, where a face decides and where edges do."""
-    coal = pytest.importorskip("coal")
-    rng = np.random.default_rng(0)
-    compared = 0
-    for _ in range(200):
-        sizes = rng.uniform(0.5, 1.5, size=(2, 3))
-        axes = np.array([np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(2)])
-        axes *= np.sign(np.linalg.det(axes))[:, None, None]
-        origins = np.array([np.zeros(3), rng.normal(scale=0.6, size=3)])
-        shapes = make_shapes(
-            [Shape(BOX, k, half_size=0.5 * size) for k, size in enumerate(sizes)], True
-        )
-        found = ContactFinder(shapes, candidate_pairs(shapes)).find(axes, origins)
-        one, other = (coal.Box(*size) for size in sizes)
-        result = coal.CollisionResult()
-        poses = [coal.Transform3s(axes[k], origins[k]) for k in range(2)]
-        if not coal.collide(one, poses[0], other, poses[1], coal.CollisionRequest(), result):
-            assert not len(found.gap) or found.gap.min() > -1e-6
-            continue
-        depth = result.getContact(0).penetration_depth
-        compared = compared + 1
-        assert found.gap.min() == pytest.approx(depth, abs=1e-6 + 0.05 * abs(depth))
-    assert compared > 50
-
-
 @SPACES
 def test_names_last_while_bodies_move_a_little(space: bool) -> None:
     """Else every step of what slides or rolls would be a new contact. Which four of more corners
@@ -175,29 +150,9 @@ def test_names_last_while_bodies_move_a_little(space: bool) -> None:
         }
 
 
-# (shape of a, shape of b or wall, place of a, gap, contacts): all numbers are binary, so that the
-# gap is exact.
-DISC = {"kind": "circle", "radius": 0.5}
-BRICK = {"kind": "box", "size": [1, 1]}
-BALL = {"kind": "sphere", "radius": 0.5}
-CUBE = {"kind": "box", "size": [1, 1, 1]}
-GROUND = {"kind": "half_plane", "point": [0, 0], "normal": [0, 1]}
-FLOOR = {"kind": "half_space", "point": [0, 0, 0], "normal": [0, 0, 1]}
-EXACT: list[tuple[Values, Values, list[float], float, int]] = [
-    (DISC, GROUND, [0, 1], 0.5, 1),
-    (BRICK, GROUND, [0, 1], 0.5, 2),
-    (DISC, DISC | {"radius": 0.25}, [-1.5, 2], 1.75, 1),
-    (DISC, BRICK | {"size": [2, 2]}, [0.25, 2], 0.5, 1),
-    (DISC | {"radius": 1}, BRICK | {"size": [2, 2]}, [4, 5], 4.0, 1),
-    (BRICK, BRICK | {"size": [2, 2]}, [0.25, 2], 0.5, 2),
-    (BRICK, BRICK | {"size": [2, 2]}, [-4.5, 5.5], 5.0, 1),
-    (BALL, FLOOR, [0, 0, 1], 0.5, 1),
-    (CUBE | {"size": [1, 2, 0.5]}, FLOOR, [0, 0, 1], 0.75, 4),
-    (BALL, BALL | {"radius": 0.25}, [1, -2, 2], 2.25, 1),
-    (BALL, CUBE | {"size": [2, 2, 2]}, [0.25, 0.5, -2], 0.5, 1),
-    (BALL | {"radius": 1}, CUBE | {"size": [2, 2, 2]}, [3, -4, 7], 6.0, 1),
-    (CUBE, CUBE | {"size": [2, 2, 2]}, [0.25, 2, 0.25], 0.5, 4),
-]
+GIVEN = YAML(typ="safe").load(Path(__file__).with_name("exact_gaps.yaml"))
+DISC, BRICK, BALL, CUBE = (GIVEN["shapes"][name] for name in ("disc", "brick", "ball", "cube"))
+EXACT = GIVEN["gaps"]
 
 
 def pair_of(a: Values, b: Values, swapped: bool = False) -> System:
@@ -225,11 +180,10 @@ def at_places(system: System, *places: list[float]) -> np.ndarray:
     return q
 
 
-@pytest.mark.parametrize(("a", "b", "place", "gap", "number"), EXACT)
+@pytest.mark.parametrize("name", EXACT)
 @pytest.mark.parametrize("swapped", [False, True])
-def test_a_gap_of_the_margin_is_kept_and_the_next_number_is_not(
-    a: Values, b: Values, place: list[float], gap: float, number: int, swapped: bool
-) -> None:
+def test_a_gap_of_the_margin_is_kept_and_the_next_number_is_not(name: str, swapped: bool) -> None:
+    a, b, place, gap, number = (EXACT[name][key] for key in ("a", "b", "place", "gap", "number"))
     swapped = swapped and "normal" not in b
     still = [0.0] * len(place)
     system = pair_of(a, b, swapped)
@@ -331,7 +285,7 @@ def test_many_shapes_are_found_without_asking_all_pairs(forces: str, monkeypatch
     ]
     bodies[0] |= {"joint": "fixed", "position": [], "velocity": []}
     contact = {"forces": forces, "restitution": 0.5}
-    wall = GROUND | {"name": "wall", "point": [0, -0.03]}
+    wall = {"name": "wall", "kind": "half_plane", "point": [0, -0.03], "normal": [0, 1]}
     contact |= {"stiffness": 500} if forces == "paper" else {}
     scene = scene_of(bodies, [wall], contact=contact)
     run = simulate(scene)
@@ -359,13 +313,14 @@ def test_bodies_that_have_left_the_range_of_cells_are_found_too() -> None:
     assert list(zip(run.contacts.body_a, run.contacts.body_b, strict=True)) == [(18, 19)]
 
 
-@pytest.mark.parametrize(("a", "b", "place", "gap", "number"), EXACT)
+@SPACES
 def test_a_buffer_that_is_full_grows_and_nothing_is_written_beyond_it(
-    a: Values, b: Values, place: list[float], gap: float, number: int, monkeypatch: Any
+    space: bool, monkeypatch: Any
 ) -> None:
-    system = pair_of(a, b)
-    q = at_places(system, place, *([[0.0] * len(place)] if "normal" not in b else []))
-    enough = system.contacts_at(q, gap)
+    system = System(crowd(space, 0))
+    placed = system.mechanism.placements(thrown(system, 0))
+    enough = system.finder.find(*placed, 3.0)
     monkeypatch.setattr(finding, "FIRST_ROOM", 1)
-    grown = ContactFinder(system.shapes, system.pairs).find(*system.mechanism.placements(q), gap)
+    grown = ContactFinder(system.shapes, system.pairs).find(*placed, 3.0)
+    assert len(grown.gap) > 30
     assert all(np.array_equal(*columns) for columns in zip(enough, grown, strict=True))
