@@ -3,6 +3,7 @@ energy ledger."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,8 @@ from iapb.run import COLLIDING, RESTING
 from iapb.scene import Scene, find_scene, load_scene
 from iapb.simulation import simulate
 from iapb.system import coupling_of
-from tests.iapb.contact.paper import scene_of
+
+HERE = Path(__file__).parent
 
 
 def shipped(name: str) -> Scene:
@@ -70,27 +72,8 @@ def test_saturation_clips_the_device_and_nothing_else() -> None:
 def test_spreading_delivers_the_prescribed_velocity_for_plastic_impacts_only(
     restitution: float, leaves_with: float, steps: int | None
 ) -> None:
-    """Erratum 5, with its numbers: 2 kg at 0.1 m/s, 15 N and 512 Hz leave with 0.0025 m/s instead
-    of 0.05 m/s."""
-    scene = scene_of(
-        [
-            {
-                "name": "tool",
-                "joint": "prismatic",
-                "axis": [1, 0],
-                "mass": 2.0,
-                "position": [-1e-5],
-                "velocity": [-0.1],
-                "shapes": [{"kind": "circle", "radius": 0.01}],
-            }
-        ],
-        [{"name": "wall", "kind": "half_plane", "point": [-0.01, 0], "normal": [1, 0]}],
-        rate=512.0,
-        duration=0.1,
-        contact={"forces": "paper", "stiffness": 0, "damping": 0, "restitution": restitution},
-        hand={"body": "tool", "force": [0, 0, 0]},
-        device={"force_limit": [15]},
-    )
+    """Erratum 5, with its numbers: the tool leaves with 0.0025 m/s instead of 0.05 m/s."""
+    scene = load_scene(HERE / "tool.yaml").with_values({"contact.restitution": restitution})
     run = simulate(scene, ImpulseAugmented(rendering="spread"))
     assert run.v[-1, 0] == pytest.approx(leaves_with, abs=5e-5) and steps in (
         None,
@@ -175,25 +158,15 @@ def test_with_contacts_the_ledger_closes_as_the_step_goes_to_zero(
     assert residuals[1] < residuals[0] / 4.0 and residuals[1] < 0.01
 
 
-BOX: dict[str, Any] = {
-    "name": "box",
-    "joint": "planar",
-    "density": 100.0,
-    "shapes": [{"kind": "box", "size": [0.1, 0.1]}],
-    "position": [0.0, 0.051, 0.0],
-    "velocity": [0.5, -1.0, 0.0],
-}
-TILES = [
-    {"name": name, "kind": "box", "size": [0.5, 0.1], "center": [x, -0.05], "restitution": e}
-    for name, x, e in (("hard", -0.25, 0.8), ("soft", 0.25, 0.0))
-]
+TILES = load_scene(HERE / "tiles.yaml")
 
 
 @pytest.mark.parametrize("forces", ["paper", "implicit"])
 def test_a_box_on_a_hard_and_a_soft_tile_turns_whichever_comes_first(forces: str) -> None:
     """Its left side bounces. Friction changes no normal velocity of the contacts that stay."""
-    contact = {"forces": forces, "stiffness": 1e4, "damping": 10.0, "friction": 0.3}
-    scene, turned = (scene_of([BOX], TILES[::way], contact=contact) for way in (1, -1))
+    given = {"contact.forces": forces, "contact.stiffness": 1e4, "contact.damping": 10.0}
+    scene = TILES.with_values(given)
+    turned = scene.with_values({"walls": scene.resolved()["walls"][::-1]})
     first = simulate(scene).impacts.v_plus[0]
     other = simulate(turned).impacts.v_plus[0]
     np.testing.assert_allclose(first, other, atol=1e-12)

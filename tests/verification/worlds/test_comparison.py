@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from iapb.errors import IapbError, SolverError
-from iapb.scene import Scene, load_scene
+from iapb.scene import load_scene
 from reference.worlds import run_world
 from verification import compare_worlds, worlds
 from verification.complementarity.of_runs import RUBBING, problems_of_run
@@ -117,32 +117,7 @@ def test_worlds_that_stop_early_or_are_not_to_be_trusted_are_not_ranked(monkeypa
     assert "the reference PB stopped" in alone.answer
 
 
-# Two balls fall on walls of their own; the second also on one without friction.
-BALLS = Scene.model_validate(
-    {
-        "name": "balls",
-        "rate": 1000,
-        "duration": 0.05,
-        "bodies": [
-            {
-                "name": name,
-                "joint": "planar",
-                "mass": 1.0,
-                "inertia": 4e-3,
-                "shapes": [{"kind": "circle", "radius": 0.1}],
-                "position": [x, 0.11, 0.0],
-                "velocity": [0.3, -1.0, 0.0],
-            }
-            for name, x in (("left", -0.5), ("right", 0.5))
-        ],
-        "walls": [
-            {"name": "soft", "kind": "box", "size": [1, 1], "center": [-0.5, -0.5]}
-            | {"restitution": 0.2, "friction": 0.4},
-            {"name": "hard", "kind": "box", "size": [1, 1], "center": [0.5, -0.5]}
-            | {"restitution": 0.9, "friction": 0.0},
-        ],
-    }
-)
+BALLS = load_scene(HERE / "balls.yaml")
 
 
 def test_each_impact_is_compared_with_its_own_restitution_and_without_friction():
