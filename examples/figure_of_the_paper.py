@@ -1,5 +1,5 @@
 """The numbers behind Figure 7: the distance of each world from the ideal world, and the figure as
-SVG.
+a page.
 
 Run it: python examples/figure_of_the_paper.py
 """
@@ -17,4 +17,4 @@ for world in ("IAPB", "PB"):
     print(
         f"{world:<5} is at most {1e3 * away[0]:.2f} mm (x) and {1e3 * away[1]:.2f} mm (y) from the ideal world"
     )
-main(["reproduce", "--figure", "fig07", "--out", "figures"])  # writes figures/fig07.svg
+main(["reproduce", "--figure", "fig07", "--out", "figures"])  # writes figures/fig07.html

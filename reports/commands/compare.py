@@ -11,8 +11,7 @@ from iapb.errors import MissingDependencyError
 from iapb.lazy import needed
 from reports.commands.run import Values, scene_given
 from reports.commands.solvers import as_json_file, facts_of, judgements
-from reports.figures.figure import draw, standalone
-from reports.figures.worlds import worlds as worlds_figure
+from reports.figures.worlds import worlds_svg
 from reports.show import Answer, Json, sentence, stage_progress
 from reports.store.io import write_whole
 from verification.finding import Finding
@@ -61,13 +60,15 @@ def compare(
     lines = [*_scene_lines(found), *judgements(found)]
     try:
         needed("matplotlib", "The figure")
-        drawn = draw(worlds_figure, found.tables)
     except MissingDependencyError as missing:  # the numbers are worth printing without it
         lines.append(str(missing))
     else:
-        if drawn.panels:
-            write_whole(place.with_suffix(".svg"), standalone(drawn))
-            lines.append(f"Figure: {place.with_suffix('.svg')}")
+        figure = place.with_suffix(".svg")
+        drawn = worlds_svg(
+            found.tables["worlds"], found.tables["over time"], found.details["against"]
+        )
+        write_whole(figure, drawn)
+        lines.append(f"Figure: {figure}")
     answer = Answer(facts_of(found), [*lines, f"Stored in {place}"], 1 if found.failures else 0)
     write_whole(place, answer.text(json_=True))
     return answer

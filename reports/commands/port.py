@@ -46,7 +46,8 @@ def port(
 
     Example: iapb port my_wall:wall --damping 0.5
     """
-    from reports.figures.port import write_map
+    from reports.figures.port import law_svg
+    from reports.store.io import write_whole
     from verification.port.device import BareDevice
     from verification.port.kit import STAGES, check_force
 
@@ -68,7 +69,8 @@ def port(
     map_file = None
     lines = [str(report)]
     if len(report.edge):  # a law without forces, and a search out of time, have none
-        map_file = write_map(FOLDER / f"{law.rpartition(':')[2]}.svg", report)
+        map_file = FOLDER / f"{law.rpartition(':')[2]}.svg"
+        write_whole(map_file, law_svg(report))
         lines.append(f"The map of devices: {map_file}")
     facts = {
         "law": report.law,

@@ -6,7 +6,6 @@ import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -18,18 +17,24 @@ from iapb.names import nearest
 from reports.commands.report import difference_lines
 from reports.difference import DIFFERS, ONLY_OLD, TOLERANCE, compare_reports, unlike
 from reports.evidence.gather import failed_cases, gather
-from reports.evidence.runs import FIGURE_RUNS, TILTED, figure_run, shipped_scene, tilted_runs
+from reports.evidence.runs import (
+    CORNER_SCENE,
+    FIGURE_RUNS,
+    TILTED,
+    corner_scene,
+    figure_run,
+    tilted_runs,
+)
 from reports.figures import RECIPES
-from reports.figures.figure import TEXTS, Recipe, draw, standalone
+from reports.figures.figure import TEXTS, draw
 from reports.numbers_file import read_numbers
-from reports.pages.builder import build_report, draw_all, figure_inputs
+from reports.pages.builder import build_report, draw_all, figure_inputs, figure_page
 from reports.pages.first import count_claims
 from reports.pages.records import FailedCases
 from reports.report import keep_answer, kept_answer, report_key, write_companions, write_report
 from reports.runner import Runner
 from reports.show import Answer, Json, stage_progress
 from reports.store.io import write_whole
-from reports.uses import parsed
 from verification.finding import REPRODUCED, Failure, Finding
 
 SHOWN_FAILURES = 20  # of a stage, in the last lines
@@ -53,14 +58,6 @@ def reproduce(
         Path | None,
         typer.Option(help="Recompute everything and compare all numbers with this report."),
     ] = None,
-    set_: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            help="With --figure: change a value of the figure's scenes, as in iapb run: "
-            "contact.friction=0.3. Repeatable.",
-        ),
-    ] = None,
     json_: Json = False,
 ) -> Answer:
     """Regenerate the report; cached results are reused."""
@@ -74,9 +71,7 @@ def reproduce(
     if check is not None:
         return check_report(check, out)
     if figure is not None:
-        return _write_figure(figure, folder, depth, set_ or [])
-    if set_:
-        raise ArgumentError("--set", " ".join(set_), "a figure whose scenes it changes: --figure")
+        return _write_figure(figure, folder, depth)
     return make_report(folder, depth)
 
 
@@ -198,12 +193,9 @@ def check_report(report: Path, out: Path | None) -> Answer:
     )
 
 
-def _write_figure(key: str, out: Path, depth: str, changes: list[str]) -> Answer:
-    """Write each panel of a figure, and all panels with the legend in one file; compute only the
-    needed inputs.
-
-    `changes` are values of the figure's scenes, as KEY=VALUE; the title and the files then say so.
-    """
+def _write_figure(key: str, out: Path, depth: str) -> Answer:
+    """Write each panel of a figure as a drawing, and a page with all of it; compute only the needed
+    inputs."""
     recipes = {recipe.key: recipe for recipe in RECIPES}
     if key not in recipes:
         listed = (f"{name} ({TEXTS[name]['title']})" for name in recipes)
@@ -211,66 +203,41 @@ def _write_figure(key: str, out: Path, depth: str, changes: list[str]) -> Answer
         meant = f"; did you mean {near}?" if near else ""
         raise ArgumentError("--figure", key, f"one of {', '.join(listed)}{meant}")
     with stage_progress() as progress:
-        inputs, failed = _inputs(recipes[key], out, depth, parsed(changes), progress)
-    undrawn: list[Failure] = []
-    drawn = draw(recipes[key], inputs, undrawn if changes else None)
-    for failure in undrawn:
-        raise ArgumentError(
-            "--set",
-            " ".join(changes),
-            f"values with which {key} can be drawn: {failure.error}: {failure.reason}",
-        )
-    if changes:
-        drawn = replace(drawn, title=f"{drawn.title}, with {', '.join(changes)}")
-        key = f"{key}-changed"
+        inputs, failed = _inputs(recipes[key].needs, out, depth, progress)
+    drawn = draw(recipes[key], inputs)
     if not drawn.panels:
         raise ArgumentError(
             "--figure", key, f"a figure whose inputs exist; missing: {', '.join(drawn.missing)}"
         )
-    pictures = {
-        f"{key}-{number}.{'html' if panel.is_table else 'svg'}": (panel.svg, panel.label)
-        for number, panel in enumerate(drawn.panels)
-    }
-    whole = f"{key}.{'html' if any(panel.is_table for panel in drawn.panels) else 'svg'}"
-    written = {
-        out / name: drawing
-        for name, drawing in {**pictures, whole: (standalone(drawn), "all of it")}.items()
-    }
-    for path, (text, _) in written.items():
-        write_whole(path, text)
-    lines = [f"{path}: {label or drawn.title}" for path, (_, label) in written.items()]
-    return Answer(
-        {"drawings": [out / name for name in pictures], "failed": failed},
-        [*lines, *_failure_lines(failed)],
-        int(bool(failed)),
-    )
-
-
-def _has_scenes_only(recipe: Recipe) -> bool:
-    """Whether the figure is drawn from runs and scenes only, so that it needs no other evidence."""
-    return all(name in (*FIGURE_RUNS, TILTED) or name.startswith("scene/") for name in recipe.needs)
+    lines = []
+    drawings = []
+    for number, panel in enumerate(drawn.panels):
+        path = out / f"{key}-{number}.svg"
+        write_whole(path, panel.svg)
+        drawings.append(path)
+        lines.append(f"{path}: {panel.label or drawn.title}")
+    page = out / f"{key}.html"
+    write_whole(page, figure_page(drawn))
+    lines += [f"{page}: all of it", *_failure_lines(failed)]
+    return Answer({"drawings": drawings, "page": page, "failed": failed}, lines, int(bool(failed)))
 
 
 def _inputs(
-    recipe: Recipe, out: Path, depth: str, values: dict[str, Any], progress: Any
+    needs: Sequence[str], out: Path, depth: str, progress: Any
 ) -> tuple[Mapping[str, Any], tuple[FailedCases, ...]]:
     """Return the inputs of a figure and the failed cases. If runs and scenes do not suffice,
     compute all evidence."""
-    needs = recipe.needs
-    if not _has_scenes_only(recipe):
-        if values:
-            able = ", ".join(each.key for each in RECIPES if _has_scenes_only(each))
-            raise ArgumentError("--set", recipe.key, f"a figure that shows scenes: {able}")
+    if not all(name in (*FIGURE_RUNS, TILTED, CORNER_SCENE) for name in needs):
         evidence = gather(out, depth, progress)
         return figure_inputs(evidence), evidence.failed
     runner = Runner(out / "runs")
     found = dict[str, Any]()
     for done, name in enumerate(needs, 1):
         if name in FIGURE_RUNS:
-            found[name] = figure_run(runner, name, values)
+            found[name] = figure_run(runner, name)
         elif name == TILTED:
-            found[name] = tilted_runs(runner, values)
+            found[name] = tilted_runs(runner)
         else:
-            found[name] = shipped_scene(name.removeprefix("scene/"), values).resolved()
+            found[name] = corner_scene()
         progress("runs of the figure", done, len(needs))
     return found, ()

@@ -54,7 +54,7 @@ def view(
     simulation = Simulation(source, law.law, law.coupling_in(source))
     if source.hand is None:
         to_stderr("The scene has no hand, so nothing can be pulled.")
-    with closing(Page(source.resolved(), port)) as page:
+    with closing(Page(source, port)) as page:
         to_stderr(f"Open {page.address}")
         if browser:
             webbrowser.open(page.address)

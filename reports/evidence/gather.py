@@ -43,14 +43,6 @@ SEEDS = {
     "robots": "verification.mechanics.against_pinocchio",
     "mass matrices": "verification.mechanics.definiteness",
 }
-SHOWN_SCENES = (
-    "peg_corner",
-    "peg_hole",
-    "wall_1d",
-    "two_link_arm_a",
-    "two_link_arm_b",
-    "arm_pushing",
-)
 FIGURE_RUNS = "runs of the figures"
 CERTIFIED = "energy"  # the stage that needs all runs of the others
 # The first stages to be computed are the longest.
@@ -95,7 +87,6 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
             haptic_rate.quoting(topic, ledger) if name == haptic_rate.TOPIC.key else topic
         )
     topics.append(_on_proofs(stages["proofs"]))
-    scenes = {name: runs.shipped_scene(name).resolved() for name in SHOWN_SCENES}
     facts = provenance()
     scene_effects = dict(stages["effects"].records or {})
     step_times = scene_effects.pop(effects.STEPS, None)
@@ -110,7 +101,7 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
         quoted["accuracy"] = value_tables({}, numbers_of(best))
     inputs = {
         **(read or {}),
-        **{f"scene/{name}": scene for name, scene in scenes.items()},
+        runs.CORNER_SCENE: runs.corner_scene(),
         runs.TILTED: tilted,
         "arm_energies": arm_energies(),
         "work_precision": measured,
@@ -123,7 +114,6 @@ def gather(out: Path, depth: str, progress: Progress) -> Evidence:
     )
     return Evidence(
         inputs=inputs,
-        scenes=scenes,
         claims=ledger,
         effects=scene_effects,
         numbers=quoted,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -34,10 +34,11 @@ FIGURE_RUNS: dict[str, tuple[str, dict[str, Any], str, str]] = {
     "device/IAPB": ("peg_corner", EMULATED_DEVICE, "IAPB", "full"),
     "device/IAPB-LM": ("peg_corner", EMULATED_DEVICE, "IAPB", "spread"),
     "device/PB": ("peg_corner", EMULATED_DEVICE, "PB", "full"),
-    "group/IAPB": ("arm_pushing", {}, "IAPB", "full"),
 }
 
-TILTED = "peg at every tilt"  # name of the input made by `tilted_runs`
+# names of the inputs made by `tilted_runs` and `corner_scene`
+TILTED = "peg at every tilt"
+CORNER_SCENE = "scene/peg_corner"
 
 
 def shipped_scene(name: str, values: dict[str, Any] | None = None) -> Scene:
@@ -59,21 +60,23 @@ def figure_runs(
     return runs
 
 
-def figure_run(runner: Runner, name: str, changed: Mapping[str, Any] | None = None) -> Run:
-    """Return the run in FIGURE_RUNS with this name, computed or read; `changed` are more values of
-    its scene."""
+def figure_run(runner: Runner, name: str) -> Run:
+    """Return the run in FIGURE_RUNS with this name, computed or read."""
     scene, values, world, rendering = FIGURE_RUNS[name]
-    return runner(shipped_scene(scene, {**values, **(changed or {})}), world, rendering)
+    return runner(shipped_scene(scene, values), world, rendering)
 
 
-def tilted_runs(
-    runner: Runner, changed: dict[str, Any] | None = None
-) -> dict[float, dict[str, Run]]:
+def tilted_runs(runner: Runner) -> dict[float, dict[str, Run]]:
     """Return the runs of the peg in the corner by tilt [rad] and world; claim C10 uses the same
     runs."""
-    scene = shipped_scene("peg_corner", changed)
+    scene = shipped_scene("peg_corner")
     with runner.recording(TILTED):
         return {
             tilt: {world: runner(Condition(tilt).place(scene), world) for world in IGNORED}
             for tilt in TILTS["full"]
         }
+
+
+def corner_scene() -> dict[str, Any]:
+    """Return the resolved scene of the peg in the corner."""
+    return shipped_scene("peg_corner").resolved()

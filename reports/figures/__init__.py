@@ -15,5 +15,4 @@ from reports.figures import (  # noqa: F401
 )
 from reports.figures.figure import MADE, TEXTS, Recipe
 
-# All but that of `iapb compare`.
-RECIPES: tuple[Recipe, ...] = tuple(MADE[key] for key in TEXTS if key != "worlds")
+RECIPES: tuple[Recipe, ...] = tuple(MADE[key] for key in TEXTS)

@@ -1,4 +1,4 @@
-"""A drawn figure as plain values, the recipe that draws it, and a figure as a file of its own.
+"""A drawn figure as plain values, and the recipe that draws it.
 
 A figure has a few panels (they wrap on a narrow screen), each one SVG or a table of coloured cells,
 a legend, a caption that says what to see, and the numbers behind it. Titles and captions are in
@@ -7,16 +7,15 @@ figures.toml, in page order. This module depends neither on matplotlib nor on th
 
 from __future__ import annotations
 
-import re
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib.resources import files
 from typing import Any
 
-from markupsafe import Markup, escape
+from markupsafe import Markup
 
-from reports.figures.style import INK, MUTED, PAPER, LineStyle, css
+from reports.figures.style import PAPER, LineStyle, css
 from verification.finding import Failure, attempt
 from verification.table import Table, titled
 
@@ -197,22 +196,6 @@ def draw(
     return (None if missing else attempt(recipe.key, drawn, failures)) or bare
 
 
-# A figure as a file of its own: panels side by side over the legend; colours are the fallbacks of
-# the page's variables
-
-# points: between panels, above them, below them
-_GAP = 24.0
-_LABEL = 26.0
-_LEGEND = 34.0
-_LETTER = 6.4  # points: mean width of a letter of the legend
-_FONT = 'font-family="DejaVu Sans, Verdana, sans-serif" font-size="11"'
-_TABLE = (
-    "body { font: 14px/1.4 Verdana, sans-serif } table { border-collapse: collapse } th { "
-    "font-weight: 400 } "
-    "td, th { padding: .3em .6em; text-align: center; border: 2px solid #fff } "
-    "th[scope=row], .plain * { text-align: left } .swatch { width: 36px; height: 14px } "
-    "li { list-style: none }"
-)
 _MARKERS = {  # paths around (18, 7)
     "o": "M14.4 7a3.6 3.6 0 1 0 7.2 0a3.6 3.6 0 1 0 -7.2 0z",
     "s": "M14.6 3.6h6.8v6.8h-6.8z",
@@ -244,61 +227,4 @@ def swatch(look: LineStyle) -> Markup:
         marker = f'<path fill="{css(fill)}" stroke="{css(edge)}" d="{_MARKERS[look.marker]}"/>'
     return Markup(
         f'<svg class="swatch" viewBox="0 0 36 14" aria-hidden="true">{line}{marker}</svg>'
-    )
-
-
-def standalone(figure: Figure) -> str:
-    """Return the figure as the text of one SVG file, or of one HTML file if a panel is a table."""
-    if any(panel.is_table for panel in figure.panels):
-        legend = Markup("").join(
-            Markup("<li>{} {}</li>").format(swatch(look), text) for text, look in figure.legend
-        )
-        panels = Markup("").join(
-            Markup("<h3>{}</h3>{}").format(panel.label, Markup(panel.svg))
-            for panel in figure.panels
-        )
-        return str(
-            Markup(
-                '<!DOCTYPE html>\n<meta charset="utf-8"><title>{0}</title><style>{1}</style>\n<h2>{0}</h2>'
-                "<ul>{2}</ul>{3}<p>{4}</p>\n"
-            ).format(figure.title, Markup(_TABLE), legend, panels, figure.caption)
-        )
-    parts = []
-    x = _GAP
-    tallest = 0.0
-    for panel in figure.panels:
-        width, height = (
-            float(part) for part in re.findall(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', panel.svg)[0]
-        )
-        parts.append(
-            f'<text x="{x:g}" y="{_LABEL - 6:g}" fill="{MUTED}">{escape(panel.label)}</text>'
-        )
-        place = f'<svg x="{x:g}" y="{_LABEL:g}" width="{width:g}" height="{height:g}"'
-        parts.append(panel.svg.replace("<svg", place, 1))
-        x = x + width + _GAP
-        tallest = max(tallest, height)
-    steps = [66 + _LETTER * len(text) for text, _ in figure.legend]
-    whole = max(x, sum(steps) + 2 * _GAP)
-    below = tallest + _LABEL + _GAP + 0.5 * _LEGEND
-    x = (whole - sum(steps)) / 2
-    for (text, look), step in zip(figure.legend, steps, strict=True):
-        parts.append(
-            str(swatch(look)).replace(
-                "<svg", f'<svg x="{x:g}" y="{below - 11:g}" width="36" height="14"', 1
-            )
-        )
-        parts.append(f'<text x="{x + 44:g}" y="{below:g}" fill="{INK}">{escape(text)}</text>')
-        x += step
-    width = whole
-    height = below + 0.5 * _LEGEND
-    return "\n".join(
-        [
-            f'<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" '
-            f'viewBox="0 0 {width:g} {height:g}" width="{width:g}" height="{height:g}" role="img" {_FONT}>',
-            f"<title>{escape(figure.title)}</title>"
-            f"<desc>{escape(' '.join(panel.alt for panel in figure.panels))}</desc>",
-            f'<rect width="100%" height="100%" fill="{PAPER}"/>',
-            *parts,
-            "</svg>\n",
-        ]
     )

@@ -1,9 +1,8 @@
-"""Figures 1 to 5 and Table I, and other scenes of the plane at their start: drawn from scene files
-and one run.
+"""Figures 1 to 5 and Table I of the paper.
 
-The arm of Figures 2 and 3 is straight, q = (π/2, 0), q̇₀ = (1, 1) rad/s, and is struck
-perpendicular to the second link at A (0.7 m) or B (0.5 m). The paper does not state the mass
-distribution, so Figure 3 has two.
+Diagrams are drawn once, in drawings/. The arm of Figures 2 and 3 is straight, q = (π/2, 0),
+q̇₀ = (1, 1) rad/s, and is struck perpendicular to the second link at A (0.7 m) or B (0.5 m). The
+paper does not state the mass distribution, so Figure 3 has two.
 """
 
 from __future__ import annotations
@@ -15,127 +14,60 @@ from typing import Any
 import numpy as np
 
 from iapb import resolve_impact
-from iapb.run import Run
 from reports.figures.figure import Drawn, Panel, recipe
-from reports.figures.geometry import Floats, body_outlines, body_placements, bounds, is_turned
 from reports.figures.numbers import MINUS
-from reports.figures.plot import Canvas, Plot, arrow, note
-from reports.figures.style import (
-    BLUE,
-    BOUND,
-    INK,
-    LINK,
-    MUTED,
-    PAPER,
-    PEG,
-    STYLES,
-    VERMILION,
-    line_arguments,
-)
+from reports.figures.plot import Plot, note
+from reports.figures.style import BOUND, STYLES, line_arguments
+from verification.impacts import Floats
 from verification.table import titled
 
-_LONGEST = 0.22  # arrow length of Figure 1, as a share of the picture
-# Figure 4 [m]: an arrow per newton, the drawn axes, the walls shown
-_ARROW = 0.02
-_AXIS = 0.006
-_WALL = 0.008
 
-
-def _drawing(name: str) -> str:
-    """Return a diagram that no number changes, drawn once."""
-    return files(__package__).joinpath("drawings", f"{name}.svg").read_text("utf-8")
+def _diagram(name: str, alt: str, label: str = "") -> Panel:
+    """Return a diagram that no number changes."""
+    svg = files(__package__).joinpath("drawings", f"{name}.svg").read_text("utf-8")
+    return Panel(svg, alt, label)
 
 
 @recipe("impact-and-step")
 def impact_and_step() -> Drawn:
     """Show the velocity before and after one impact, and the loop of a step."""
-    panels = (
-        Panel(
-            _drawing("impact"),
-            "An arrow v⁻, its part P v⁻ along the contact, and the velocity after the impact, which "
-            "is no longer than v⁻.",
-            "one impact, e = 0.5",
-        ),
-        Panel(
-            _drawing("step"),
-            "Find contacts; new ones get an impulse, lasting ones a spring; add the hand's force; "
-            "move; again.",
-            "one step",
-        ),
+    impact = _diagram(
+        "impact",
+        "An arrow v⁻, its part P v⁻ along the contact, and the velocity after the impact, which "
+        "is no longer than v⁻.",
+        "one impact, e = 0.5",
     )
-    return Drawn(panels)
+    step = _diagram(
+        "step",
+        "Find contacts; new ones get an impulse, lasting ones a spring; add the hand's force; "
+        "move; again.",
+        "one step",
+    )
+    return Drawn([impact, step])
 
 
-@recipe("fig01", "group/IAPB")
-def contact_forces(run: Run) -> Drawn:
-    """Draw the hardest collision and the last resting instant of the run."""
-    impulses = run.contacts.impulse
-    forces = run.contacts.normal_force
-    scene = run.scene_resolved
-    touching = np.flatnonzero(np.diff(run.contacts.offsets))
-    instants = []
-    if impulses.any():
-        hardest = (
-            np.searchsorted(run.contacts.offsets, np.argmax(np.abs(impulses)), side="right") - 1
-        )
-        instants.append(("(a) colliding: impulses", int(hardest), impulses, "N s"))
-    if len(touching):
-        instants.append(("(b) resting: forces", int(touching[-1]), forces, "N"))
-    panels = list[Panel]()
-    rows = list[tuple[object, ...]]()
-    for title, step, values, unit in instants:
-        pose = run.pose[step]
-        contacts = range(*map(int, run.contacts.offsets[step : step + 2]))
-        low, high = bounds(body_outlines(scene, pose), 0.12)
-        longest = _LONGEST * max(high - low)
-        largest = max(abs(values[k]) for k in contacts)
-        with Canvas(f"fig01-{len(panels)}", low, high, turned=is_turned(scene)) as canvas:
-            canvas.walls(scene)
-            canvas.bodies(scene, pose)
-            for k in contacts:
-                point = run.contacts.point[k, :2]
-                canvas.axes.plot(*point, "o", color=INK, markersize=3.5, zorder=7)
-                if values[k]:
-                    arrow(
-                        canvas.axes,
-                        point,
-                        longest * values[k] / largest * run.contacts.normal[k, :2],
-                        color=BLUE,
-                    )
-            canvas.hand(scene, pose, 0.8 * longest)
-        told = ", ".join(f"{values[k]:.3g} {unit}" for k in contacts)
-        panels.append(
-            Panel(
-                canvas.svg,
-                f"The group at t = {run.time[step]:.3f} s with its contacts; along their "
-                f"normals: {told}.",
-                title,
-            )
-        )
-        rows += [
-            (
-                title[4:],
-                float(run.time[step]),
-                *map(float, 1e3 * run.contacts.point[k, :2]),
-                float(values[k]),
-                unit,
-            )
-            for k in contacts
-        ]
-    return Drawn(
-        panels,
-        titled(
-            (
-                "instant",
-                "t [s]",
-                "contact x [mm]",
-                "y [mm]",
-                "impulse or force along the normal",
-                "unit",
-            ),
-            rows,
-        ),
+@recipe("fig01")
+def contact_forces() -> Drawn:
+    """Show the hardest collision and the last resting instant of a run of the scene
+    arm_pushing."""
+    colliding = _diagram(
+        "group_colliding",
+        "The block at the wall and the arm behind it; an impulse acts at each of three contacts.",
+        "(a) colliding: impulses",
     )
+    resting = _diagram(
+        "group_resting",
+        "The same, later: a spring's force acts at each contact, and the hand pushes.",
+        "(b) resting: forces",
+    )
+    return Drawn([colliding, resting])
+
+
+@recipe("fig02")
+def arm() -> Drawn:
+    """Show the arm, and where it is struck."""
+    alt = "Two links in a straight line from a fixed pivot, struck at A or at B of the second link."
+    return Drawn([_diagram("arm", alt)])
 
 
 LENGTH = 1.0  # of both links [m]
@@ -167,52 +99,6 @@ def arm_energies() -> dict[str, Floats]:
                 ]
             )
     return table
-
-
-@recipe("fig02", "scene/two_link_arm_a", "scene/two_link_arm_b")
-def arm(scene: Mapping[str, Any], _: Mapping[str, Any]) -> Drawn:
-    """Draw the arm from the resolved scene; the two scenes differ only in the contact point."""
-    poses = list(body_placements(scene).values())[:2]
-    joints = np.array([poses[0].origin[:2], *(frame.of((LENGTH, 0.0)) for frame in poses)])
-    pivot = joints[0]
-    low = joints.min(axis=0) - (1.25, 0.22)
-    high = joints.max(axis=0) + (1.25, 0.12)
-    with Canvas("fig02", low, high, (3.6, 3.3)) as canvas:
-        axes = canvas.axes
-        axes.fill(
-            pivot[0] + np.array([-0.14, 0.14, 0.14, -0.14]),
-            pivot[1] + np.array([-0.16, -0.16, -0.08, -0.08]),
-            facecolor=MUTED,
-            edgecolor="none",
-            alpha=0.6,
-        )
-        axes.plot([pivot[0], pivot[0]], [pivot[1] - 0.08, pivot[1]], color=INK, linewidth=2)
-        for number, line in enumerate((joints[:2], joints[1:]), start=1):
-            for color, width in ((LINK, 10), (PEG, 8)):
-                axes.plot(*line.T, color=color, linewidth=width, solid_capstyle="round", zorder=2)
-            axes.plot(
-                *line[0], "o", markersize=7, markerfacecolor=PAPER, markeredgecolor=INK, zorder=5
-            )
-            note(axes, line.mean(axis=0), f"l{number} = 1 m, m{number} = 1 kg", (14, 0), ha="left")
-            note(axes, line[0], f"q̇{number} = 1 rad/s", (14, 0), ha="left", color=MUTED)
-        for (name, distance), color in zip(
-            CONTACTS.items(), (BLUE, VERMILION), strict=True
-        ):  # opposite to the motion
-            point = poses[1].of((distance, 0.0))
-            normal = -poses[1].rotation[:2, 1]
-            arrow(axes, point - 0.42 * normal, 0.36 * normal, color=color)
-            note(
-                axes,
-                point - 0.42 * normal,
-                f"{name}, {distance} m",
-                (-5, 0),
-                color=color,
-                ha="right",
-            )
-    words = ", ".join(
-        f"{name} is {distance} m along the second link" for name, distance in CONTACTS.items()
-    )
-    return Drawn([Panel(canvas.svg, f"Two links in a straight line from a fixed pivot; {words}.")])
 
 
 @recipe("fig03", "arm_energies")
@@ -278,31 +164,10 @@ def energy_loss(energies: Mapping[str, Floats]) -> Drawn:
 
 @recipe("fig04", "scene/peg_corner")
 def peg_corner(scene: Mapping[str, Any]) -> Drawn:
-    """Draw the peg at its start, from the resolved scene."""
-    low, high = bounds([*body_outlines(scene), np.zeros((1, 2))], 0.12)
-    # x to the left, y down: show some of both walls
-    low = np.minimum(low, -_WALL)
-    high = np.maximum(high, _WALL)
-    with Canvas("fig04", low, high, turned=True) as canvas:
-        canvas.walls(scene)
-        canvas.bodies(scene)
-        center, force = (
-            np.asarray(each[:2])
-            for each in (scene["bodies"][0]["position"], scene["hand"]["force"])
-        )
-        arrow(canvas.axes, center, _ARROW * force)
-        note(canvas.axes, center + _ARROW * force, "F hand", (6, -8), ha="left")
-        for vector, name, offset in (
-            ((_AXIS, 0), "x", (0, 7)),
-            ((0, _AXIS), "y", (7, 2)),
-        ):  # axes of the world
-            arrow(canvas.axes, (0.0, 0.0), vector, color=MUTED, width=1.1, head=7)
-            note(canvas.axes, vector, name, offset, color=MUTED)
-        canvas.scale_bar((high[0] - 0.002, high[1] - 0.003), 0.01, "10 mm")
-    panel = Panel(
-        canvas.svg,
-        "A small tilted rectangle above a floor and left of a wall, with the hand's force "
-        "pointing to the lower right.",
+    """Show the peg at its start, and the values of the scene."""
+    alt = (
+        "A small tilted rectangle above a floor and left of a wall, with the hand's force pointing "
+        "to the lower right."
     )
     body = scene["bodies"][0]
     contact = scene["contact"]
@@ -329,21 +194,21 @@ def peg_corner(scene: Mapping[str, Any]) -> Drawn:
         (quantity, ", ".join(f"{value:g}" for value in values).replace("-", MINUS), by)
         for quantity, values, by in given
     )
-    return Drawn([panel], titled(("quantity", "value", "given by"), rows))
+    return Drawn([_diagram("peg", alt)], titled(("quantity", "value", "given by"), rows))
 
 
 @recipe("fig05", "scene/peg_corner")
 def couplings(scene: Mapping[str, Any]) -> Drawn:
     """Show both diagrams; the table repeats the scene's gains."""
     panels = (
-        Panel(
-            _drawing("unilateral"),
+        _diagram(
+            "unilateral",
             "The hand pushes the device only; a spring and damper joins device and tool while the "
             "tool is in contact.",
             "(a) unilateral coupler: CBuc",
         ),
-        Panel(
-            _drawing("four_channel"),
+        _diagram(
+            "four_channel",
             "The hand pushes device and tool alike; the environment force of the tool goes to the "
             "device; a spring and damper joins device and tool.",
             "(b) four channels: ideal, IAPB, PB",

@@ -1,27 +1,21 @@
-"""One drawing: axes in the report's style, pictures of scenes in the plane, and the SVG, the same
-bytes each time."""
+"""One drawing: axes in the report's style, and the SVG, the same bytes each time."""
 
 from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from types import TracebackType
 from typing import Any
 
 import numpy as np
 
-from reports.figures.geometry import Floats, body_outlines, body_placements, wall_outlines, widened
 from reports.figures.numbers import power_of_ten
 from reports.figures.style import (
     FORCE,
-    INK,
-    MUTED,
     PANEL,
     PARAMETERS,
-    PEG,
     VARIABLES,
-    WALL,
     LineStyle,
     css,
     line_arguments,
@@ -33,8 +27,6 @@ PATH = "path"
 TOLERANCE = (
     0.01  # points, 1/30000 of the width of a panel: peaks and corners stay, straight runs go
 )
-_ASIDE = 9.0  # points from an arrow to its name
-_SIDEWAYS = 0.3  # horizontal share of the way to the name from which the name begins there
 LARGEST_ENLARGEMENT = 1.35  # wider drawings would have too large letters
 
 
@@ -52,7 +44,6 @@ class Plot:
     Attributes
     ----------
     axes, each, drawing : matplotlib's (first) axes, all of them, and the figure
-    words : text after the name of a curve, in a legend above the axes
     svg : the SVG of the panel
     """
 
@@ -71,7 +62,6 @@ class Plot:
         self.bare = bare
         self.shape = shape
         self.svg = ""
-        self.words: dict[str, str] = {}
         self.drawing: Any
         self.axes: Any
 
@@ -99,17 +89,8 @@ class Plot:
         trace: TracebackType | None,
     ) -> None:
         if error is None:
-            if self.words:
-                self._add_legend()
             self.svg = self._traced() if self.kind else to_svg(self.drawing, self.key)
         self._style.__exit__(kind, error, trace)
-
-    def _add_legend(self) -> None:
-        """Write the name of each curve that has words, and these, above the axes."""
-        curves = {line.get_gid(): line for line in self.axes.lines}
-        lines = [curves[f"curve={name}"] for name in self.words]
-        texts = [name + words for name, words in self.words.items()]
-        self.drawing.legend(lines, texts, loc="outside upper left", fontsize=8)
 
     def _traced(self) -> str:
         """Return the SVG with what the page's script reads values with: the frame in points, limits
@@ -169,76 +150,6 @@ class Plot:
         getattr(self.axes, f"set_{axis}ticks")(shown, [f"{value:g}" for value in shown])
 
 
-# Pictures of scenes: equal scales, no axes, filled walls and bodies; lengths are in metres
-
-
-class Canvas(Plot):
-    """A panel without axes that shows at least the rectangle from `low` to `high`, at equal scales.
-
-    Without a `size` the panel has the standard width and the proportions of the rectangle. A
-    picture that is `turned`, by 180 degrees, has x to the left and y down.
-    """
-
-    def __init__(
-        self,
-        key: str,
-        low: Floats,
-        high: Floats,
-        size: tuple[float, float] | None = None,
-        *,
-        turned: bool = False,
-    ) -> None:
-        width, height = high - low
-        super().__init__(key, size or (PANEL[0], PANEL[0] * height / width), bare=True)
-        (left, bottom), (right, top) = widened(low, high, self.size[0] / self.size[1])
-        self.limits = (
-            {"xlim": (right, left), "ylim": (top, bottom)}
-            if turned
-            else {"xlim": (left, right), "ylim": (bottom, top)}
-        )
-
-    def __enter__(self) -> Canvas:
-        super().__enter__()
-        self.axes.set(**self.limits)
-        return self
-
-    def walls(self, scene: Mapping[str, Any]) -> None:
-        """Fill the static world."""
-        for corners in wall_outlines(scene, reach=1.0):
-            self.axes.fill(*corners.T, facecolor=WALL, edgecolor="none", zorder=1)
-
-    def bodies(self, scene: Mapping[str, Any], pose: Floats | None = None) -> None:
-        """Fill the moving bodies at a `pose` of a run, by default at the start of the scene."""
-        for corners in body_outlines(scene, pose):
-            self.axes.fill(*corners.T, facecolor=PEG, edgecolor=INK, linewidth=1.1, zorder=2)
-
-    def hand(self, scene: Mapping[str, Any], pose: Floats | None, length: float) -> None:
-        """Draw the hand's force as an arrow of the given length [m] from the point that it
-        holds."""
-        if scene["hand"] and np.any(force := np.asarray(scene["hand"]["force"][:2], dtype=float)):
-            start = body_placements(scene, pose)[scene["hand"]["body"]].of(scene["hand"]["point"])[
-                :2
-            ]
-            self.named_arrow(start, length * force / np.hypot(*force), "hand")
-
-    def named_arrow(self, start: Floats, vector: Floats, name: str) -> None:
-        """Draw an arrow and its name, to the right of its middle or, if it is horizontal, above
-        it."""
-        arrow(self.axes, start, vector)
-        way = np.subtract(*self.axes.transData.transform([start + vector, start]))
-        aside = np.array([way[1], -way[0]]) / np.hypot(*way)
-        aside = aside if aside[0] > _SIDEWAYS or abs(aside[0]) <= _SIDEWAYS < aside[1] else -aside
-        side = "left" if aside[0] > _SIDEWAYS else "center"
-        note(self.axes, start + 0.5 * vector, name, tuple(_ASIDE * aside), color=FORCE, ha=side)
-
-    def scale_bar(self, start: tuple[float, float], length: float, text: str) -> None:
-        """Draw a scale bar to the right of `start`, with its text above it."""
-        right = np.sign(np.subtract(*self.axes.get_xlim()[::-1]))
-        ends = np.array([start, (start[0] + right * length, start[1])])
-        self.axes.plot(*ends.T, color=MUTED, linewidth=1.4, solid_capstyle="butt", zorder=7)
-        note(self.axes, ends.mean(axis=0), text, (0, 6), fontsize=8.5)
-
-
 def arrow(
     axes: Any, tail: Any, vector: Any, *, color: str = FORCE, width: float = 1.6, head: float = 9.0
 ) -> None:
@@ -296,14 +207,7 @@ _CLEANED: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
             lambda number: f"{float(number[0]):.2f}".rstrip("0").rstrip("."), tag[0]
         ),
     ),
-    (r'\stransform="rotate\(-?0 [^)]*\)"', ""),
-    (
-        r'\sd="[^"]*"',
-        lambda path: " " + _COMMAND.sub(r"\1", path[0].strip()),
-    ),  # letters part the numbers of a path
     (r">\s+<", "><"),
-    (rf'<g clip-path="([^"]*)">{_MARKERS}(?:<g clip-path="\1">{_MARKERS})+', _clipped_once),
-    (r'<use [^>]*? style="([^"]*)"/>(?:<use [^>]*? style="\1"/>)+', _styled_once),
     (r"'DejaVu Sans'[^;\"]*", "var(--sans, sans-serif)"),
     ("|".join(VARIABLES), lambda color: css(color[0])),
 )

@@ -5,10 +5,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from reports.figures.figure import Drawn, Panel, recipe
 from reports.figures.numbers import power_of_ten
 from reports.figures.plot import Plot
-from reports.figures.style import LineStyle, line_arguments, looks_of
+from reports.figures.style import PAPER, LineStyle, line_arguments, looks_of
 from verification.table import Table
 
 _DISTANCES = ("configuration", "velocity", "impulse")  # zero in the reference world
@@ -25,52 +24,48 @@ _PANELS = {
 }
 
 
-@recipe("worlds", "worlds", "over time")
-def worlds(table: Table, series: Table) -> Drawn:
+def worlds_svg(table: Table, series: Table, against: str) -> str:
     """Draw five curves over time for each world, and bars of the time of a step."""
-    names = [str(name) for name in table.column("world")]
-    against = next(
-        (name for name in names if not any(series.where(world=name).column("configuration"))), ""
-    )
-    looks = looks_of(names)
+    looks = looks_of(str(name) for name in table.column("world"))
     with Plot("worlds", (9.6, 5.4), shape=(2, 3)) as plot:
         for axes, (key, (title, factor)) in zip(plot.each, _PANELS.items(), strict=False):
-            shown = [name for name in names if key not in _DISTANCES or name != against]
-            shown = [name for name in shown if None not in series.where(world=name).column(key)]
-            _curves(axes, series, key, factor, {name: looks[name] for name in shown})
+            _curves(axes, series, key, factor, looks, against)
             axes.set(title=title, xlabel="time [s]")
-        bars = plot.each[5]
-        spent = dict(zip(table.column("world"), table.column("time per step"), strict=True))
-        drawn = bars.barh(
-            list(spent),
-            list(spent.values()),
-            color=[looks[name].color for name in spent],
-            height=0.6,
-        )
-        bars.bar_label(drawn, [f"{value:.3g}" for value in spent.values()], padding=3)
-        bars.set(
-            xscale="log",
-            title="time of a step [µs]",
-            xticks=[],
-            xlim=(0.5 * min(spent.values()), 8.0 * max(spent.values())),
-        )
-        bars.minorticks_off()
-        bars.invert_yaxis()
-    alt = f"Worlds {', '.join(names)} over time: {'; '.join(title for title, _ in _PANELS.values())}; time per step."
-    legend = {f"{name} (reference)" if name == against else name: looks[name] for name in names}
-    return Drawn([Panel(plot.svg, alt, wide=True)], table, legend)
+        _bars(plot.each[5], table, looks)
+        plot.drawing.set_facecolor(PAPER)
+        lines = [plot.axes.plot([], [], **line_arguments(look))[0] for look in looks.values()]
+        names = [f"{name} (reference)" if name == against else name for name in looks]
+        plot.drawing.legend(lines, names, loc="outside upper left", ncols=len(names))
+    return plot.svg
 
 
-def _curves(axes: Any, series: Table, key: str, factor: float, looks: dict[str, LineStyle]) -> None:
-    peaks = [factor * max(series.where(world=name).column(key)) for name in looks]
-    seen = [peak for peak in peaks if peak > _ROUNDING * max(peaks, default=0.0)]
+def _bars(axes: Any, table: Table, looks: dict[str, LineStyle]) -> None:
+    spent = table.column("time per step")
+    colors = [look.color for look in looks.values()]
+    drawn = axes.barh(list(looks), spent, color=colors, height=0.6)
+    axes.bar_label(drawn, fmt="{:.3g}", padding=3)
+    limits = (0.5 * min(spent), 8.0 * max(spent))
+    axes.set(xscale="log", title="time of a step [µs]", xticks=[], xlim=limits)
+    axes.minorticks_off()
+    axes.invert_yaxis()
+
+
+def _curves(
+    axes: Any, series: Table, key: str, factor: float, looks: dict[str, LineStyle], against: str
+) -> None:
+    curves = {}
+    for name in looks:
+        mine = series.where(world=name)
+        values = mine.column(key)
+        if None not in values and not (key in _DISTANCES and name == against):
+            curves[name] = mine.column("time"), [factor * value for value in values]
+    peaks = [max(values) for _, values in curves.values()]
+    seen = [peak for peak in peaks if peak > _ROUNDING * max(peaks)]
     if key in _DISTANCES and seen and max(seen) > _LINEAR * min(seen):
         axes.set(yscale="log", ylim=(0.1 * min(seen), 2.0 * max(seen)))
         axes.yaxis.set_major_formatter(lambda value, _: power_of_ten(value))
         axes.yaxis.set_minor_formatter(lambda *_: "")
-    for k, (name, look) in enumerate(looks.items()):
-        mine = series.where(world=name)
-        times = mine.column("time")
-        values = [factor * value for value in mine.column(key)]
-        apart = max(1, len(times) // 6)
-        axes.plot(times, values, markevery=(k * apart // len(looks), apart), **line_arguments(look))
+    for number, (name, (times, values)) in enumerate(curves.items()):
+        every = max(1, len(times) // 6)
+        marks = number * every // len(curves), every
+        axes.plot(times, values, markevery=marks, **line_arguments(looks[name]))

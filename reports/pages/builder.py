@@ -152,6 +152,11 @@ def build_report(
     )
 
 
+def figure_page(figure: Figure) -> str:
+    """Return a page of one figure, with its legend, caption and numbers."""
+    return _environment().get_template("figure.html.j2").render(figure=figure)
+
+
 def link_across(pages: Mapping[str, str]) -> dict[str, str]:
     """Change each link to an id on another page, such as ``href="#C10"``, to a link to that page.
 
@@ -177,13 +182,12 @@ def link_across(pages: Mapping[str, str]) -> dict[str, str]:
 def figure_inputs(evidence: Evidence) -> dict[str, Any]:
     """Return all possible inputs of figures by name: runs, scenes, and the tables of claims and
     topics."""
-    scenes = {f"scene/{name}": scene for name, scene in evidence.scenes.items()}
     tables = {
         f"{topic.key}/{name}": table
         for topic in (*evidence.claims, *evidence.topics)
         for name, table in topic.tables.items()
     }
-    return {**scenes, **tables, **evidence.inputs}
+    return {**tables, **evidence.inputs}
 
 
 def map_of(claim: Finding) -> Figure | None:

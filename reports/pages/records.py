@@ -30,7 +30,6 @@ class Evidence:
     names that the figures use (`needs` of each recipe)."""
 
     inputs: Mapping[str, Any] = field(default_factory=dict)
-    scenes: Mapping[str, Any] = field(default_factory=dict)  # resolved scenes by name
     claims: tuple[Finding, ...] = ()
     effects: Mapping[str, Table] = field(
         default_factory=dict

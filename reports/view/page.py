@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import secrets
 import time
-from collections.abc import Mapping
 from contextlib import redirect_stdout
 from io import StringIO
 from typing import Any
@@ -13,9 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from reports.figures.geometry import extent, is_spatial, is_turned, solids
+from iapb.scene import Scene
+from iapb.scene.mechanism import mechanism_of, start_of
 from reports.view.guard import HOST, guarded
 from reports.view.loop import Pull
+from reports.view.shapes import extent, solids
 
 Floats = NDArray[np.float64]
 
@@ -35,7 +36,7 @@ class Page:
 
     Parameters
     ----------
-    scene : a resolved scene.
+    source : the scene that it shows.
     port : of the server; if it is taken, the next free one.
 
     Attributes
@@ -44,9 +45,10 @@ class Page:
     pull : what the mouse pulls now.
     """
 
-    def __init__(self, scene: Mapping[str, Any], port: int) -> None:
+    def __init__(self, source: Scene, port: int) -> None:
         import viser
 
+        scene = source.resolved()
         word = secrets.token_urlsafe(16)
         with guarded(word), redirect_stdout(StringIO()):  # it prints an address without the word
             self._server = viser.ViserServer(HOST, port, f"iapb · {scene['name']}", verbose=False)
@@ -54,14 +56,15 @@ class Page:
         self.address = f"http://{HOST}:{self._server.get_port()}/{word}/"
         self.pull: Pull | None = None
         self._shown = self._seen = 0.0  # when the last frame was sent, and when a browser was there
-        self._look(scene)
+        start = mechanism_of(source).poses(start_of(source)[0][None], planar=False)[0]
+        size = self._look(scene, start)
         add = self._server.scene
         names = [body["name"] for body in scene["bodies"]]
         self._frames = {name: add.add_frame(f"/{name}", show_axes=False) for name in names}
         tool = (scene.get("hand") or {}).get("body")
-        for number, solid in enumerate(solids(scene)):
-            vertices = solid.vertices.astype(np.float32)
-            faces = solid.faces.astype(np.uint32)
+        for number, solid in enumerate(solids(scene, size)):
+            vertices = solid.corners.astype(np.float32)
+            faces = solid.triangles()
             color = _TOOL if solid.body == tool else _BODY if solid.body else _WALL
             mesh = add.add_mesh_simple(
                 f"/{solid.body or 'world'}/{number}", vertices, faces, color=color, side="double"
@@ -113,13 +116,15 @@ class Page:
         is_held = event.phase != "end" and np.all(np.isfinite([*self._grip, *event.end_position]))
         self.pull = Pull(self._grip, np.array(event.end_position)) if is_held else None
 
-    def _look(self, scene: Mapping[str, Any]) -> None:
-        """Set the camera: planar scenes from the front, others from the side, z up."""
-        low, high = extent(scene)
+    def _look(self, scene: dict[str, Any], start: Floats) -> float:
+        """Set the camera: planar scenes from the front, others from the side, z up; return the size
+        of the scene [m]."""
+        low, high = extent(scene, start)
         size = float(np.linalg.norm(high - low))
-        up = (0.0, -1.0 if is_turned(scene) else 1.0, 0.0)
+        turned = scene["name"].startswith("peg_")  # the paper's frame: x to the left and y down
+        up = (0.0, -1.0 if turned else 1.0, 0.0)
         towards = _FRONT
-        if is_spatial(scene):
+        if scene.get("dimensions") == 3:
             up = (0.0, 0.0, 1.0)
             towards = _SIDE
         camera = self._server.initial_camera
@@ -128,3 +133,4 @@ class Page:
         camera.position = camera.look_at + size * np.array(towards)
         camera.near = 0.01 * size
         self._server.scene.set_up_direction(up)
+        return size

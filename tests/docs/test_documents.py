@@ -21,9 +21,6 @@ sys.path.insert(0, str(Path(__file__).parent))  # importmode=importlib does not
 
 from performing import ROOT, read_blocks
 
-from reports.cli import main
-
-PICTURES = ROOT / "docs/pictures"
 DOCUMENTS = (
     "README.md",
     *(
@@ -193,21 +190,3 @@ def test_extension(path, tmp_path):
     done = subprocess.run([sys.executable, path], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert not differs(done.stdout, says)
-
-
-@pytest.mark.parametrize(
-    ("figure", "name"),
-    [
-        ("fig01", "impulses_and_forces"),
-        ("fig05", "couplings"),
-    ],
-)
-def test_pictures_show_the_runs_of_today(figure, name, shared):
-    """What they say of themselves in words and numbers, such as the forces at the contacts."""
-    drawn = shared / "figures" / f"{figure}.svg"
-    assert main(["reproduce", "--figure", figure, "--out", str(drawn.parent)]) == 0
-    said, shown = (
-        re.findall(r"<desc>(.*?)</desc>", path.read_text(encoding="utf-8"), flags=re.S)[0]
-        for path in (drawn, PICTURES / f"{name}.svg")
-    )
-    assert not differs(said, shown), f"draw it again: iapb reproduce --figure {figure}"

@@ -132,7 +132,6 @@ REFUSED = [  # status, command line, what the refusal says
     (1, "sweep corner_tlt", "did you mean corner_tilt?"),
     (1, "prove theorem1", "did you mean theorem_1?"),
     (1, "reproduce --figure fig7", "did you mean fig07?"),
-    (1, "reproduce --set contact.friction=0.2", "a figure whose scenes it changes"),
     (1, "report diff here there", "report = 'here'"),
     (1, "bench --budget 50", "budget = '50': expected a time with its unit, e.g. 50us"),
     (1, "effects peg_corner --measure --world ideal", "--measure needs a world of the compiled"),
@@ -180,19 +179,6 @@ JSON = {  # of each row in the documents: the status, and a command
 }
 
 
-def test_a_figure_of_changed_scenes_says_so_and_leaves_the_papers_figure(answer, here):
-    turned = "bodies.peg.position=[0.03, -0.02, 0.5]"
-    figure = ("reproduce", "--figure", "fig04", "--out", "drawn")
-    assert answer(*figure)[0] == 0 == answer(*figure, "--set", turned)[0]
-    plain, changed = (
-        (here / "drawn" / f"{name}.svg").read_text(encoding="utf-8")
-        for name in ("fig04", "fig04-changed")
-    )
-    assert turned in changed and turned not in plain
-    drawings = [re.sub("<title>.*</title>", "", text) for text in (plain, changed)]
-    assert drawings[0] != drawings[1], "the peg is drawn where the value puts it"
-
-
 def test_json_has_the_keys_that_the_documents_list_and_an_error_is_an_object_too(answer, here):
     found = {}
     for row, (status, line) in JSON.items():
@@ -215,7 +201,9 @@ def test_json_has_the_keys_that_the_documents_list_and_an_error_is_an_object_too
     assert "def test_" in found["verify-many"]["counterexamples"][0]["test"]
     assert found["port"]["broken_laws"] == ["bounded"] and Path(found["port"]["map"]).is_file()
     assert [one["verdict"] for one in found["prove"]["statements"]] == ["proved"]
-    assert all(Path(each).is_file() for each in found["reproduce --figure"]["drawings"])
+    drawn = found["reproduce --figure"]
+    assert all(Path(each).is_file() for each in (*drawn["drawings"], drawn["page"]))
+    assert "Two uniform links" in Path(drawn["page"]).read_text(encoding="utf-8")
     for status, line in ((1, "run no_such_scene"), (2, "run peg_corner --speed 3")):
         ended, error = answer(*line.split())
         assert ended == error["status"] == status and error["error"]

@@ -295,12 +295,12 @@ def of_runs(patch, folder, failures):
     patch.setattr(
         runs,
         "FIGURE_RUNS",
-        {name: runs.FIGURE_RUNS[name] for name in ("corner/IAPB", "group/IAPB")},
+        {name: runs.FIGURE_RUNS[name] for name in ("corner/IAPB", "device/IAPB")},
     )
     patch.setattr(
         runs,
         "shipped_scene",
-        broken(runs.shipped_scene, lambda name, values: name == "arm_pushing"),
+        broken(runs.shipped_scene, lambda name, values: values),
     )
     assert list(runs.figure_runs(Runner(folder), nothing, failures)) == ["corner/IAPB"]
 
@@ -316,7 +316,7 @@ def of_runs(patch, folder, failures):
                 "C07, point masses at the ends of the links, 0.0, 0.1",
             ],
         ),
-        (of_runs, ["group/IAPB"]),
+        (of_runs, ["device/IAPB"]),
     ],
 )
 def test_a_case_that_raises_costs_its_row_only(stage, failed, monkeypatch, tmp_path):

@@ -11,14 +11,11 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 
-from iapb.scene import find_scene, load_scene, scene_names
-from iapb.system import System
-from reports.evidence.runs import TILTED
+from reports.evidence.runs import CORNER_SCENE, TILTED, corner_scene
 from reports.figures import RECIPES
 from reports.figures.condition_map import condition_map
 from reports.figures.corner import UNLIMITED
 from reports.figures.figure import draw
-from reports.figures.geometry import body_placements, is_spatial, solids
 from reports.figures.hard_cases import _map_of
 from reports.figures.paper import arm_energies
 from reports.figures.plot import Plot
@@ -142,20 +139,10 @@ def tables():
 def all_inputs():
     """Return the inputs of all figures: made up or computed at once."""
     needed = sorted({name for recipe in RECIPES for name in recipe.needs})
-    scenes = {
-        "corner": "peg_corner",
-        "device": "peg_corner",
-        "group": "arm_pushing",
-    }
     runs = {
-        name: made_motion(scenes[name.split("/")[0]], k)
+        name: made_motion("peg_corner", k)
         for k, name in enumerate(needed)
-        if name.split("/")[0] in scenes
-    }
-    given = {
-        name: load_scene(find_scene(name[6:])).resolved()
-        for name in needed
-        if name.startswith("scene/")
+        if name.split("/")[0] in ("corner", "device")
     }
     tilted = {
         tilt: {name: runs[f"corner/{name}"] for name in UNLIMITED}
@@ -167,7 +154,7 @@ def all_inputs():
     computed = {name: checks[name].table(study) for name in needed if name in checks}
     return {
         **runs,
-        **given,
+        CORNER_SCENE: corner_scene(),
         **tables(),
         **computed,
         TILTED: tilted,
@@ -262,27 +249,3 @@ def test_what_no_case_of_a_method_map_tried_is_not_called_stable():
     made = _map_of([dict(zip(("case", "method", "outcome"), row, strict=True)) for row in rows])
     easy = ElementTree.fromstring(made).findall(".//tr")[2]
     assert ["".join(cell.itertext()) for cell in easy.iter("td")] == ["✓", "·"]
-
-
-@pytest.mark.parametrize("name", scene_names())
-def test_bodies_are_closed_with_their_outside_out_and_where_the_engine_has_them(name):
-    """Triangles for the browser."""
-    scene = load_scene(find_scene(name))
-    resolved = scene.resolved()
-    mechanism = System(scene).mechanism
-    for piece in solids(resolved):
-        edges = {(face[i], face[i - 2]) for face in piece.faces.tolist() for i in range(3)}
-        volumes = np.linalg.det(piece.vertices[piece.faces] - piece.vertices.mean(axis=0))
-        assert volumes.sum() > 0.0 and volumes.min() >= -1e-12 * volumes.sum()
-        if len(piece.vertices) < 100:  # the poles of a ball are many corners in one place
-            assert all((b, a) in edges for a, b in edges)
-    q = mechanism.integrate(
-        System(scene).make_state().q, np.random.default_rng(4).normal(size=mechanism.nv), 0.7
-    )
-    rotations, origins = mechanism.placements(q)
-    for name, place in body_placements(
-        resolved, mechanism.poses(q[None], planar=not is_spatial(resolved))[0]
-    ).items():
-        body = mechanism.index(name)
-        assert place.origin == pytest.approx(origins[body], abs=1e-12)
-        assert place.rotation == pytest.approx(rotations[body], abs=1e-12)

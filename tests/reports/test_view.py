@@ -13,7 +13,7 @@ from websockets.datastructures import Headers
 from websockets.exceptions import InvalidHandshake
 from websockets.sync.client import connect
 
-from iapb.scene import find_scene, load_scene
+from iapb.scene import find_scene, load_scene, scene_names
 from iapb.simulation import Simulation
 from iapb.worlds import find_world
 from reference.worlds import run_world
@@ -23,6 +23,7 @@ from reports.store.runs import read_entry, read_run
 from reports.view.guard import allowed
 from reports.view.loop import PULLED, TICK, Pull, spring, watch
 from reports.view.page import Page
+from reports.view.shapes import solids
 
 PEG = load_scene(find_scene("peg_corner"))
 AWAY = np.array([0.04, -0.04, 0.0])  # [m] from the corner, into the open
@@ -140,8 +141,8 @@ def test_the_command_stores_what_was_seen_and_says_if_nothing_can_be_pulled(
     class Made(Script):
         address = "http://here/"
 
-        def __init__(self, resolved, port):
-            assert resolved["name"] == scene and port == 8080
+        def __init__(self, source, port):
+            assert source.name == scene and port == 8080
             super().__init__({5: None if told else Pull(np.zeros(3), AWAY)})
 
         def wait(self):
@@ -189,9 +190,28 @@ def test_only_the_page_itself_reaches_the_server(path, headers, expected):
 @pytest.fixture
 def page():
     """The page of the peg, without a browser."""
-    made = Page(PEG.resolved(), 18080)
+    made = Page(PEG, 18080)
     yield made
     made.close()
+
+
+@pytest.mark.parametrize("name", scene_names())
+def test_solids_are_closed_with_their_outside_out(name):
+    for solid in solids(load_scene(find_scene(name)).resolved(), 1.0):
+        faces = solid.triangles()
+        edges = {(face[i], face[i - 2]) for face in faces.tolist() for i in range(3)}
+        assert all((b, a) in edges for a, b in edges)
+        volumes = np.linalg.det(solid.corners[faces] - solid.corners.mean(axis=0))
+        assert volumes.min() >= -1e-12 * volumes.sum()
+
+
+def test_solids_are_where_the_scene_puts_them():
+    """The peg's corners and the floor, whose surface is y = 0 and whose inside is below (y > 0)."""
+    peg, *walls = solids(PEG.resolved(), 1.0)
+    assert peg.corners.max(axis=0) == pytest.approx([*CORNER[:2], 0.05])
+    floor = next(wall for wall in walls if wall.corners[:, 1].max() > 5.0)
+    assert floor.corners[:, 1].min() == pytest.approx(0.0)
+    assert {wall.body for wall in walls} == {""}
 
 
 def dragged(phase, start, end):
