@@ -1,4 +1,4 @@
-"""When formula and complementarity agree: two landings of a bar, the map, and how often they do."""
+"""When formula and complementarity agree: two landings of a bar, and the map."""
 
 from __future__ import annotations
 
@@ -6,9 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from markupsafe import Markup
-
-from reports.figures.figure import Drawn, Panel, grid, recipe
+from reports.figures.figure import Drawn, Panel, recipe
 from reports.figures.numbers import format_number
 from reports.figures.plot import Plot, arrow, note
 from reports.figures.style import (
@@ -20,10 +18,7 @@ from reports.figures.style import (
     MUTED,
     PEG,
     WALL,
-    LineStyle,
-    css,
 )
-from verification.complementarity.agreement import RANDOM, SCENE
 from verification.complementarity.landings import HALF_LENGTH
 from verification.complementarity.landings import PEG as PAPERS_PEG
 from verification.table import Table
@@ -36,16 +31,6 @@ _THICK = 0.09
 _FLOOR = -0.55
 _LONG = 0.42
 _BORDER = ("cosine", "speed ratio", "agreement predicted", "agreement found")
-_WIDEST = 9.0  # [em] of the longest bar
-_KINDS = {
-    "cradle": "balls in a row",
-    "obtuse normals": "no push moves another contact (c ≤ 0)",
-    "face on floor": "face of a box on the floor",
-    "corner": "box in a corner",
-    "tight hole": "peg in a tight hole",
-    "random rows": "random contacts",
-    "with a neighbour": "random contacts, one more touching",
-}
 
 
 @recipe("condition", "complementarity/landings", "complementarity/two contacts")
@@ -157,47 +142,3 @@ def _map(border: Table, drawn: Sequence[Row], peg: float) -> str:
         )
         axes.grid(False)
     return plot.svg
-
-
-@recipe("how-often", "complementarity/map")
-def how_often(numbers: Table) -> Drawn:
-    """Draw the impacts that agree and differ by kind, as bars on one scale."""
-    most = max(numbers["cases"])
-    panels = []
-    for kind, title in ((RANDOM, "random impacts"), (SCENE, "impacts of our scenes")):
-        rows = sorted(
-            numbers.where(kind=kind).records(), key=lambda row: float(-row["agree"] / row["cases"])
-        )
-        lines = {_name(row["impacts"]): _cells(row, most) for row in rows}
-        table = grid(("same", "differ", "impacts", "same [%]"), lines, "plain bars")
-        panels.append(Panel(table, f"{title}: how many agree.", title))
-    return Drawn(
-        panels,
-        numbers,
-        {"same velocity": _square(GREEN), "differ: an impulse must pull": _square(FORCE)},
-    )
-
-
-def _name(kind: str) -> str:
-    return _KINDS.get(kind, kind.replace("_", " "))
-
-
-def _cells(row: Row, most: int) -> list[Markup]:
-    width = _WIDEST / most
-    bar = Markup("").join(
-        Markup('<i style="width:{:.2f}em;background:{}"></i>').format(width * row[key], css(color))
-        for key, color in (("agree", GREEN), ("differ", FORCE))
-        if row[key]
-    )
-    share = format_number(100.0 * row["agree"] / row["cases"], 2)
-    number = Markup('<td class="n">{}</td>').format
-    return [
-        number(f"{row['agree']:,}"),
-        number(f"{row['differ']:,}"),
-        Markup('<td class="bar">{}</td>').format(bar),
-        number("100" if row["differ"] == 0 else share),
-    ]
-
-
-def _square(color: str) -> LineStyle:
-    return LineStyle(color, "s", (), 0.0)

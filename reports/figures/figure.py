@@ -1,8 +1,8 @@
 """A drawn figure as plain values, and the recipe that draws it.
 
-A figure has a few panels (they wrap on a narrow screen), each one SVG or a table of coloured cells,
-a legend, a caption that says what to see, and the numbers behind it. Titles and captions are in
-figures.toml, in page order. This module depends neither on matplotlib nor on the page.
+A figure has a few panels (they wrap on a narrow screen), a legend, a caption that says what to see,
+and the numbers behind it. Titles and captions are in figures.toml, in page order. This module
+depends neither on matplotlib nor on the page.
 """
 
 from __future__ import annotations
@@ -26,42 +26,10 @@ Legend = Mapping[str, LineStyle] | Iterable[tuple[str, LineStyle]]
 class Panel:
     """One drawing; `label` is its heading, `alt` its description for readers who cannot see it."""
 
-    svg: str  # or the HTML of a table (`grid`)
+    svg: str
     alt: str
     label: str = ""
     wide: bool = False  # take the whole width of the page
-
-    @property
-    def is_table(self) -> bool:
-        """Whether the panel is a table."""
-        return self.svg.startswith("<table")
-
-
-def cell(text: str | Markup, *, color: str = "", strength: float = 0.0) -> Markup:
-    """Return a cell of a table: its text, and a colour of the text or, with a strength, of the
-    cell."""
-    look = f"color: {css(color)}" if color else ""
-    if strength:
-        look = f"background: color-mix(in srgb, {css(color)} {100 * strength:g}%, transparent)"
-    style = Markup(' style="{}"').format(look) if look else ""
-    return Markup("<td{}>{}</td>").format(style, text)
-
-
-def grid(columns: Sequence[str], rows: Mapping[str, Sequence[Markup]], kind: str = "") -> str:
-    """Return a table of cells as HTML: a heading for each column and, as text or Markup, for each
-    row.
-
-    kind : "plain" for texts instead of coloured cells
-    """
-    join = Markup("").join
-    head = join(Markup('<th scope="col"><span>{}</span></th>').format(column) for column in columns)
-    body = join(
-        Markup('<tr><th scope="row">{}</th>{}</tr>').format(name, join(cells))
-        for name, cells in rows.items()
-    )
-    return Markup(
-        '<table class="grid {}"><thead><tr><td></td>{}</tr></thead><tbody>{}</tbody></table>'
-    ).format(kind, head, body)
 
 
 @dataclass(frozen=True)

@@ -12,13 +12,14 @@ from posixpath import dirname, relpath
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from reports.figures import RECIPES
 from reports.figures.condition_map import condition_map
 from reports.figures.figure import TEXTS, Figure, Recipe, draw, swatch
 from reports.figures.figure import numbers_of as figure_numbers
 from reports.figures.numbers import format_cell, is_number
+from reports.pages.cells import by_agreement, method_map
 from reports.pages.first import count_claims
 from reports.pages.formulas import formula, prose
 from reports.pages.numbers import FILTERS, is_absent, numbers_of
@@ -271,6 +272,8 @@ def _environment() -> Environment:
         tables_without=tables_without,
         stated=stated,
         unstated=unstated,
+        method_map=method_map,
+        by_agreement=by_agreement,
         title=lambda name: name[:1].upper() + name[1:],
         **FILTERS,
     )
@@ -281,11 +284,6 @@ def _environment() -> Environment:
 
 
 def _labelled(panel: Any) -> Markup:
-    """Return a panel with its description: its SVG as an image, or its table."""
-    label = Markup('aria-label="{}"').format(panel.alt)
-    drawn = str(panel.svg)  # not Markup, which would escape what replaces its text
-    return Markup(
-        drawn.replace("<table ", f"<table {label} ", 1)
-        if panel.is_table
-        else drawn.replace("<svg ", f'<svg role="img" {label} ', 1)
-    )
+    """Return the SVG of a panel as an image with its description."""
+    label = escape(panel.alt)
+    return Markup(panel.svg.replace("<svg ", f'<svg role="img" aria-label="{label}" ', 1))

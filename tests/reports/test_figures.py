@@ -16,7 +16,6 @@ from reports.figures import RECIPES
 from reports.figures.condition_map import condition_map
 from reports.figures.corner import UNLIMITED
 from reports.figures.figure import draw
-from reports.figures.hard_cases import _map_of
 from reports.figures.paper import arm_energies
 from reports.figures.plot import Plot
 from reports.figures.style import LOOKS, OUTCOMES, STYLES, VARIABLES
@@ -24,7 +23,6 @@ from tests.reports.made_up import made_motion
 from verification.check import Study
 from verification.complementarity.agreement import TWO_CONTACTS
 from verification.complementarity.landings import LANDINGS
-from verification.cost.growth import MILLISECOND, TITLES
 from verification.cost.trajectories import BELOW, OK, TIMED_OUT, WORLDS
 from verification.stability.port import COUPLINGS
 from verification.table import titled
@@ -40,14 +38,6 @@ def tables():
     """Return a made-up table for each input of a figure that is a table and takes long to
     compute."""
     made = {
-        "complementarity/map": (
-            "impacts; kind; cases; agree; differ",
-            (
-                (f"{kind} {k}", kind, 75, 75 - 9 * k, 9 * k)
-                for kind in ("random", "scene")
-                for k in range(4)
-            ),
-        ),
         "energy/impacts": (
             "method; family; impacts; gains; largest relative gain; "
             "median relative gain of those that gain",
@@ -60,24 +50,6 @@ def tables():
         "energy/scenes": (
             "scene; left open at the scene's step [%]",
             ((scene, 0.0 if k == 0 else 0.8 * k) for k, scene in enumerate(SCENES)),
-        ),
-        "hard-cases/every method": (
-            "case; kind; method; outcome",
-            (
-                (f"{kind} {k}", kind, method, outcome)
-                for kind, methods in (
-                    ("impact", ("factored", "svd", "gram_pinv")),
-                    ("motion", ("IAPB", "PB")),
-                )
-                for k, outcomes in enumerate(
-                    (
-                        ("stable", "stable", "stable"),
-                        ("stable", "gains energy", "not tried"),
-                        ("wrong motion", "refused", "depends on rounding"),
-                    )
-                )
-                for method, outcome in zip(methods, outcomes, strict=False)
-            ),
         ),
         "hard-cases/the failure": (
             "case; world; time [s]; kinetic energy [mJ]",
@@ -94,14 +66,6 @@ def tables():
                 (motion, 1, step, 0.0 if k else 1e-12, 0.1 * step, 0.3 * step)
                 for k, motion in enumerate(("a toss", "a bounce"))
                 for step in (4.0, 1.0, 0.25)
-            ),
-        ),
-        "haptic-rate/C19": (
-            "method; deadline; coordinates; contacts; time [µs]",
-            (
-                (method, MILLISECOND, d, c, 10.0**k * d * c ** (0.9 + k))
-                for k, method in enumerate(TITLES.values())
-                for d, c in ((12, 60), (12, 300), (12, 1200), (3, 60), (30, 60))
             ),
         ),
         "haptic-rate/motions": (
@@ -242,10 +206,3 @@ def test_a_map_counts_what_holds_and_keeps_the_numbers_of_its_axes(monkeypatch):
     assert "2 of 3" in panel.alt and "0.001" in re.findall(r">([\d.]+)</text>", panel.svg)
     crossed = [found for look, found in marks if look == OUTCOMES["fails"]]
     assert crossed == [[(1.0, 0.0)]] and len(marks) == 3  # a full dot, a smaller one
-
-
-def test_what_no_case_of_a_method_map_tried_is_not_called_stable():
-    rows = [("a", "IAPB", "stable"), ("b", "IAPB", "stable"), ("b", "svd", "failed")]
-    made = _map_of([dict(zip(("case", "method", "outcome"), row, strict=True)) for row in rows])
-    easy = ElementTree.fromstring(made).findall(".//tr")[2]
-    assert ["".join(cell.itertext()) for cell in easy.iter("td")] == ["✓", "·"]

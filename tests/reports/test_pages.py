@@ -11,10 +11,11 @@ from jinja2 import UndefinedError
 
 from iapb.errors import ArgumentError
 from reports.crate import CRATE_NAME
-from reports.figures.figure import Figure, Panel, cell, grid
+from reports.figures.figure import Figure, Panel
 from reports.figures.paper import arm_energies
 from reports.numbers_file import NUMBERS_NAME
 from reports.pages.builder import ROWS_SHOWN, _environment, build_report, draw_all, link_across
+from reports.pages.cells import by_agreement, method_map
 from reports.pages.formulas import prose
 from reports.pages.numbers import ABSENT, num, numbers_of, percent, time, times
 from reports.pages.page import FIRST_PAGE, PAGES
@@ -214,11 +215,31 @@ def test_powers_of_ten_read_as_people_write_them(text, shown):
     assert str(prose(text)).replace("\u202f", " ") == shown
 
 
+def test_methods_are_mapped_with_failures_of_the_engine_first_and_agreement_falls():
+    rows = [
+        ("a", "impact", "factored", "stable"),
+        ("b", "impact", "factored", "stable"),
+        ("b", "impact", "svd", "failed"),
+        ("c 1e-6", "impact", "factored", "wrong motion"),
+        ("m", "motion", "IAPB", "stable"),
+    ]
+    found = method_map(titled(("case", "kind", "method", "outcome"), rows), "impact")
+    assert (found.methods, found.cases, found.easy) == (["factored", "svd"], 3, 1)
+    assert list(found.hard) == ["c 10⁻⁶", "b"] and found.right == {"factored": "2/3", "svd": "0/1"}
+    assert found.tried == {"factored"}  # what no easy case tried is not called stable
+    columns = ("impacts", "kind", "cases", "agree", "differ")
+    kinds = titled(columns, [("a", "scene", 4, 1, 3), ("b", "scene", 4, 3, 1), ("c", "x", 1, 1, 0)])
+    assert [(row["impacts"], row["share"]) for row in by_agreement(kinds, "scene")] == [
+        ("b", 0.75),
+        ("a", 0.25),
+    ]
+
+
 def test_a_figure_names_its_runs_and_the_command_that_draws_it_and_a_long_table_is_cut():
-    panel = Panel(grid(("a",), {"row": [cell("x")]}), 'says "x"')
-    drawn = Figure("fig07", "", "A table", "Look.", (panel,), None, (), ("C10", "a table"))
+    panel = Panel("<svg ></svg>", 'says "x"')
+    drawn = Figure("fig07", "", "A curve", "Look.", (panel,), None, (), ("C10", "a table"))
     page = build_report(Evidence(runs=RUNS), [drawn])["report/figures.html"]
-    assert "says &#34;x&#34;" in page and "&lt;table" not in page
+    assert "says &#34;x&#34;" in page and "&lt;svg" not in page
     assert "Data: C10, a table. To compute it again: <code>iapb reproduce --fig" in page
     rows = tuple((float(n),) for n in range(ROWS_SHOWN + 1))
     page = joined(Evidence(topics=(one("stability", tables={"trees": titled(("x",), rows)}),)))
