@@ -3,15 +3,18 @@ motion, judged from the record alone."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from ruamel.yaml import YAML
 
 from iapb import resolve_frictional_impact, resolve_impact
 from iapb.contact.laws import ImpulseAugmented, Penalty
 from iapb.run import COLLIDING, FREE, RESTING, Run
 from iapb.scene import Scene, find_scene, load_scene
+from iapb.scene.reading import scene_from_values
 from iapb.simulation import simulate
 from iapb.system import System
 from tests.iapb.contact import paper
@@ -21,155 +24,18 @@ Values = dict[str, Any]
 ROUNDING = 1e-9  # of sums of a few dozen products, in units of the largest
 
 
-def pit(space: bool, **contact: Any) -> Scene:
-    """Discs, rectangles and polygons (balls and cuboids) thrown into a pit with a floor and two
-    slopes."""
-    rng = np.random.default_rng(7)
-    n = 3 if space else 2
-    kinds: list[Values] = (
-        [
-            {"kind": "box", "size": [0.2, 0.16, 0.12]},
-            {"kind": "sphere", "radius": 0.1, "center": [0.02, 0.0, 0.01]},
-        ]
-        if space
-        else [
-            {"kind": "box", "size": [0.2, 0.14]},
-            {"kind": "circle", "radius": 0.1, "center": [0.02, 0.01]},
-            {"kind": "polygon", "vertices": [[-0.1, -0.08], [0.12, -0.05], [0.03, 0.1]]},
-        ]
-    )
-    bodies = []
-    for k in range(6):
-        place = [0.24 * (k % 3 - 1), *([0.12 * (k % 2)] * space), 0.1 + 0.2 * (k // 3)]
-        spin = rng.normal(size=3 if space else 1)
-        turn = [*(0.6 * spin / np.linalg.norm(spin)), 0.8] if space else spin.tolist()
-        mass = float(rng.uniform(0.5, 3.0))
-        bodies.append(
-            {
-                "name": f"b{k}",
-                "joint": "free_flyer" if space else "planar",
-                "mass": mass,
-                "inertia": (mass * rng.uniform(2e-3, 4e-3, 3)).tolist() if space else 3e-3 * mass,
-                "shapes": [kinds[k % len(kinds)]],
-                "position": [*place, *turn],
-                "velocity": [
-                    *rng.normal(scale=0.5, size=n - 1),
-                    -1.0,
-                    *rng.normal(scale=3.0, size=len(spin)),
-                ],
-            }
-        )
-    up = np.eye(n)[-1]
-    walls = [
-        {
-            "name": f"w{k}",
-            "kind": "half_space" if space else "half_plane",
-            "point": (x * np.eye(n)[0]).tolist(),
-            "normal": (up - x * np.eye(n)[0] * 2.0).tolist(),
-        }
-        for k, x in enumerate((0.0, 0.5, -0.5))
-    ]
-    given = {"forces": "paper", "stiffness": 3000, "damping": 5, "restitution": 0.4}
-    return paper.scene_of(
-        bodies,
-        walls,
-        rate=500.0,
-        duration=0.35,
-        gravity=(-9.81 * up).tolist(),
-        integrator="semi_implicit_euler",
-        contact=given | contact,
-    )
+GIVEN = YAML(typ="safe").load(Path(__file__).with_name("steps.yaml"))
+CASES = GIVEN["cases"]
 
 
-def shipped(name: str, **values: Any) -> Scene:
-    return load_scene(find_scene(name)).with_values(
-        {key.replace("__", "."): value for key, value in values.items()}
-    )
-
-
-def pushed_peg(**values: Any) -> Scene:
-    """The peg driven fast into its corner, by a hand that asks for more than the device gives."""
-    start = {
-        "bodies__peg__position": [0.0209, -0.0141, 0.08],
-        "device__force_limit": [3, 3, 0.05],
-        "duration": 0.6,
-    }
-    return shipped("peg_corner", **start, contact__friction=0.1, **values)
-
-
-def held(scene: Scene) -> Scene:
-    """The third body in a hand, with a device so weak that the impulses of its whole group are
-    scaled."""
-    return scene.with_values(
-        {"hand": {"body": "b2", "force": [0.5, 0, 0]}, "device": {"force_limit": [40, 30, 2]}}
-    )
-
-
-def touching_row() -> Scene:
-    """Five discs in a row, struck: the gaps of four are zero to the last bit, so their contacts
-    never had a force."""
-    bodies = [
-        {
-            "name": f"d{k}",
-            "joint": "planar",
-            "mass": 1.0,
-            "inertia": 1e-4,
-            "position": [0.03125 * k, 0, 0],
-            "shapes": [{"kind": "circle", "radius": 0.015625}],
-        }
-        for k in range(5)
-    ]
-    bodies[0] |= {"position": [-0.005, 0, 0], "velocity": [1, 0, 0]}
-    return paper.scene_of(
-        bodies, [], contact={"forces": "paper", "stiffness": 1e4, "damping": 0, "restitution": 0.9}
-    )
-
-
-def each_its_own(scene: Scene, field: str) -> Scene:
-    """Bodies and walls with values of their own, some with none."""
-    values = {
-        f"bodies.{body.name}.{field}": (0.1, None, 1.0)[k % 3]
-        for k, body in enumerate(scene.bodies)
-    }
-    return scene.with_values(
-        values
-        | {f"walls.{wall.name}.{field}": (0.3, None)[k % 2] for k, wall in enumerate(scene.walls)}
-    )
-
-
-CASES: dict[str, tuple[Scene, Any]] = {
-    "plane, two rows for two bodies": (
-        pit(False, self_collision_rows="per_body"),
-        ImpulseAugmented(),
-    ),
-    "plane, friction": (each_its_own(pit(False, friction=0.4), "friction"), ImpulseAugmented()),
-    "plane, filters": (
-        pit(False, cluster_distance=0.15, coherence_distance=0.03),
-        ImpulseAugmented(),
-    ),
-    "plane, as printed": (
-        pit(False, penalty="printed", friction=0.5, damping=60, restitution=0),
-        ImpulseAugmented(),
-    ),
-    "plane, penalties": (pit(False, friction=0.3), Penalty()),
-    "plane, slow approach rests": (pit(False, approach_velocity=0.3), ImpulseAugmented()),
-    "plane, unequal": (each_its_own(pit(False), "restitution"), ImpulseAugmented()),
-    "plane, pushing": (pit(False, friction=0.4), ImpulseAugmented(pushing=True)),
-    "plane, impact friction": (
-        each_its_own(pit(False, friction=0.3), "friction"),
-        ImpulseAugmented(friction_in_impacts=True),
-    ),
-    "space": (pit(True, friction=0.4), ImpulseAugmented()),
-    "space, unequal": (each_its_own(pit(True), "restitution"), ImpulseAugmented()),
-    "space, impact friction": (pit(True, friction=0.3), ImpulseAugmented(friction_in_impacts=True)),
-    "arm and block": (shipped("arm_pushing", duration=0.6), ImpulseAugmented()),
-    "cradle": (shipped("newton_cradle", duration=0.1), ImpulseAugmented()),
-    "cradle that touches": (touching_row(), ImpulseAugmented()),
-    "plane, scaled group": (held(pit(False)), ImpulseAugmented(rendering="scale")),
-    "plane, spread group": (held(pit(False)), ImpulseAugmented(rendering="spread")),
-    "peg, scaled": (pushed_peg(contact__restitution=0.6), ImpulseAugmented(rendering="scale")),
-    "peg, spread": (pushed_peg(), ImpulseAugmented(rendering="spread")),
-}
+def scene_and_law(case: Values) -> tuple[Scene, Any]:
+    if "shipped" in case:
+        scene = load_scene(find_scene(case["shipped"]))
+    else:
+        scene = scene_from_values(GIVEN["scenes"][case["scene"]])
+    law = case.get("law", {})
+    made = Penalty() if law == "penalty" else ImpulseAugmented(**law)
+    return scene.with_values(case.get("set", {})), made
 
 
 class Step:
@@ -397,7 +263,7 @@ class Step:
 
 @pytest.mark.parametrize("name", CASES)
 def test_every_step_is_the_papers(name: str) -> None:
-    scene, law = CASES[name]
+    scene, law = scene_and_law(CASES[name])
     run = simulate(scene, law)
     system = System(scene)
     law = law.within(system.scene)
