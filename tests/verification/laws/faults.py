@@ -1,7 +1,7 @@
 """Textbook resolvers whose contacts only push, and resolvers with one planted bug each, by the law
 that detects it.
 
-The report shows one fault per law (`verification.laws.planted`); these are the others.
+The report shows one fault per law of equalities (`verification.laws.planted`).
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from reference.complementarity import ImpactProblem, solve
 from reference.exact import exact_impact
 from verification.impacts import Floats
 from verification.laws.resolver import Resolver, least_push, sound_resolver, whitened
-from verification.methods import gram_pinv
 
 TOO_MUCH = Fraction(10001, 10000)  # factor on the impulse that e requires
 Impulses = tuple[Floats, Floats]
@@ -39,15 +38,6 @@ def makes_stale_jacobian() -> Resolver:
     """Returns a resolver that reuses the Jacobian of the first call with each shape."""
     remembered: dict[tuple[int, ...], Floats] = {}
     return lambda M, J, v, e: sound_resolver(M, remembered.setdefault(J.shape, J), v, e)
-
-
-# name -> the law that must detect it, and how to make it
-BUGS: dict[str, tuple[str, Callable[[], Resolver]]] = {
-    "reversed velocity": ("impulse_range", lambda: reversed_velocity),
-    "printed formula": ("kinetic_energy", lambda: gram_pinv),
-    "stale Jacobian": ("restitution", makes_stale_jacobian),
-    "returns too much": ("kinetic_energy", lambda: returns_too_much),
-}
 
 
 # Contacts that only push.
