@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.verification.test_certificate import near_the_border
 from verification.certificate import EXPORT_HEAD, exported, judge_gains
 from verification.finding import REFUTED, REPRODUCED
 from verification.numbers import read_values
@@ -48,25 +49,6 @@ def checker(tmp_path_factory: pytest.TempPathFactory) -> Path:
     done = make(folder, "checker")
     assert done.returncode == 0, done.stderr
     return folder / "build" / "checker"
-
-
-def near_the_border(
-    n: int, d: int, rng: np.random.Generator, decades: float
-) -> tuple[np.ndarray, ...]:
-    """M asymmetric in the last bit, v and w = ±v with one unit in the last place planted in one
-    entry: gain or loss."""
-    root = rng.normal(size=(n, d, d))
-    mass = np.nextafter(
-        root @ root.transpose(0, 2, 1), np.where(rng.random((n, d, d)) < 0.5, np.inf, -np.inf)
-    )
-    v = rng.normal(size=(n, d)) * 10.0 ** rng.uniform(-decades, decades, (n, 1))
-    w = np.where(rng.random((n, 1)) < 0.5, v, -v)
-    entry = rng.integers(0, d, n)
-    towards = np.where(rng.random(n) < 0.5, np.inf, -np.inf)
-    w[np.arange(n), entry] = np.nextafter(w[np.arange(n), entry], towards)
-    same = rng.random(n) < 0.1  # w = −v gains nothing and loses nothing
-    w[same] = -v[same]
-    return mass, v, w
 
 
 @needs_ocaml
