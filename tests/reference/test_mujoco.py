@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from iapb import simulate
-from iapb.scene import Scene
+from iapb.scene import scene_from_text
 from iapb.scene.mechanism import mechanism_of
 from iapb.scene.reading import scene_from_values
 from reference.mujoco import LEAST_RESTITUTION, MuJoCo, damping_ratio_of, spring_restitution
@@ -29,29 +29,17 @@ RIGHT = {
     "hand_holds_arm": 1.0,
     "ladder_slips": 1.0,
 }
-GROUND = {"name": "floor", "kind": "half_space", "point": [0, 0, 0], "normal": [0, 0, 1]}
-
-
-def ball(restitution: float, **more: Any) -> Scene:
-    body = {
-        "name": "ball",
-        "joint": "free_flyer",
-        "mass": 0.3,
-        "inertia": [1e-4] * 3,
-        "shapes": [{"kind": "sphere", "radius": 0.05}],
-        "position": [0, 0, 0.3, 0, 0, 0, 1],
-    }
-    values = {
-        "name": "ball",
-        "dimensions": 3,
-        "rate": 1000,
-        "duration": 0.5,
-        "gravity": [0, 0, -9.81],
-        "bodies": [body],
-        "walls": [GROUND],
-        "contact": {"restitution": restitution},
-    }
-    return scene_from_values(values | more)
+BALL = scene_from_text("""name: ball
+dimensions: 3
+rate: 1000
+duration: 0.5
+gravity: [0, 0, -9.81]
+bodies:
+  - {name: ball, joint: free_flyer, mass: 0.3, inertia: [1e-4, 1e-4, 1e-4], shapes: [{kind: sphere, radius: 0.05}],
+     position: [0, 0, 0.3, 0, 0, 0, 1]}
+walls: [{name: floor, kind: half_space, point: [0, 0, 0], normal: [0, 0, 1]}]
+contact: {restitution: 0.5}
+""")
 
 
 @pytest.mark.parametrize("name", RIGHT)
@@ -64,7 +52,7 @@ def test_ordinary_scenes_have_their_known_outcome(name: str) -> None:
 
 @pytest.mark.parametrize("restitution", [0.5, 1.0])
 def test_a_ball_bounces_with_the_share_of_its_speed(restitution: float) -> None:
-    run = simulate(ball(restitution), world="mujoco")
+    run = simulate(BALL.with_values({"contact.restitution": restitution}), world="mujoco")
     speed = run.v[:, 2]
     before = float(-speed.min())
     after = float(speed[np.argmin(speed) :].max())
@@ -98,7 +86,7 @@ def test_free_bodies_and_joints_move_as_in_our_worlds() -> None:
 
 
 def test_what_a_run_lacks_is_absent() -> None:
-    run = simulate(ball(0.5), world="mujoco", steps=20)
+    run = simulate(BALL, world="mujoco", steps=20)
     assert (run.law, run.world, run.coupling) == ("MuJoCo", "mujoco", "none")
     assert not run.records_contacts and "contacts not recorded" in run.summary
     absent = (run.state, run.penalty_force, run.contacts.gap, run.impacts.step)
@@ -113,7 +101,7 @@ def test_what_a_run_lacks_is_absent() -> None:
     ("values", "ignored"),
     [
         ({"contact": "paper"}, ["contact.forces"]),
-        ({"contact": {"restitution": 0.9 * LEAST_RESTITUTION}}, ["contact.restitution"]),
+        ({"contact.restitution": 0.9 * LEAST_RESTITUTION}, ["contact.restitution"]),
         (
             {
                 "hand": {"body": "ball"},
@@ -126,12 +114,12 @@ def test_what_a_run_lacks_is_absent() -> None:
     ],
 )
 def test_what_it_ignores_is_named(values: dict[str, Any], ignored: list[str]) -> None:
-    assert list(MuJoCo().ignored(ball(0.5, **values))) == ignored
+    assert list(MuJoCo().ignored(BALL.with_values(values))) == ignored
 
 
 def test_each_pair_has_its_own_friction_and_restitution() -> None:
     scene = CASES["ball_starts_to_roll"].scene
-    walls = [GROUND | {"friction": 0.4, "restitution": 0.5}]
+    walls = [scene["walls"][0] | {"friction": 0.4, "restitution": 0.5}]
     body = scene["bodies"][0] | {"friction": 0.9, "restitution": 0.3}
     model = MuJoCo().model(scene_from_values(scene | {"walls": walls, "bodies": [body]}))
     assert model.pair_friction[0, :2] == pytest.approx(math.sqrt(0.4 * 0.9))
@@ -145,7 +133,7 @@ def test_the_limits_of_a_hinge_are_in_radians() -> None:
 
 
 def test_an_unstable_simulation_ends_and_says_why() -> None:
-    run = MuJoCo(impact_steps=1e-4).run(ball(1.0))
+    run = MuJoCo(impact_steps=1e-4).run(BALL.with_values({"contact.restitution": 1.0}))
     assert not run.complete and "unstable" in run.stopped
     assert 0 < run.steps < 500 and np.isfinite(run.q).all() and np.isfinite(run.v).all()
 
@@ -154,15 +142,14 @@ def test_an_interrupted_run_keeps_its_steps() -> None:
     def stop(done: int, total: int) -> None:
         raise KeyboardInterrupt
 
-    run = MuJoCo().run(ball(0.5, duration=1.0), progress=stop)
+    run = MuJoCo().run(BALL.with_values({"duration": 1.0}), progress=stop)
     assert run.stopped == "interrupted" and 0 < run.steps < 1000
 
 
 def test_inertia_has_its_axes() -> None:
     """A body alone, whose products of inertia are not zero, has our M."""
     mujoco = pytest.importorskip("mujoco")
-    body = {"name": "b", "joint": "free_flyer", "mass": 1.0, "inertia": [1, 2, 2.5, 0.1, 0.2, 0.3]}
-    scene = ball(0.0, bodies=[body])
+    scene = BALL.with_values({"bodies.ball.inertia": [1, 2, 2.5, 0.1, 0.2, 0.3]})
     model = MuJoCo().model(scene)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)

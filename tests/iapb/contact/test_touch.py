@@ -208,24 +208,28 @@ def test_an_impulse_is_recorded_where_it_struck(seed: int) -> None:
     assert certificate.span < 1e-12  # rounding; the tolerance of a certificate is 1e-9
 
 
-def spinning_pair(turns: tuple[float, float], start: tuple[float, float, float], v: float) -> Scene:
+PAIR = scene_from_text("""name: pair
+rate: 1000
+duration: 0.001
+bodies:
+  - {name: still, joint: planar, mass: 1, inertia: 1e-3, shapes: [{kind: box, size: [0.06, 0.06]}]}
+  - {name: flying, joint: planar, mass: 1, inertia: 1e-3, shapes: [{kind: box, size: [0.04, 0.04]}]}
+""")
+
+
+def spinning_pair(turns: tuple[float, float], start: list[float], v: float) -> Scene:
     """Two boxes whose corners turn by up to a radian in the one step of the scene."""
-    boxes = [
-        {"name": "still", "size": 0.06, "position": [0.0] * 3, "velocity": [0.0, 0.0, turns[0]]},
-        {"name": "flying", "size": 0.04, "position": list(start), "velocity": [v, 0.0, turns[1]]},
-    ]
-    bodies = [
-        {key: box[key] for key in ("name", "position", "velocity")}
-        | {"joint": "planar", "mass": 1, "inertia": 1e-3}
-        | {"shapes": [{"kind": "box", "size": [box["size"], box["size"]]}]}
-        for box in boxes
-    ]
-    return scene_from_values({"name": "pair", "rate": 1000, "duration": 0.001, "bodies": bodies})
+    values = {
+        "bodies.still.velocity": [0.0, 0.0, turns[0]],
+        "bodies.flying.velocity": [v, 0.0, turns[1]],
+        "bodies.flying.position": start,
+    }
+    return PAIR.with_values(values)
 
 
 def test_corners_that_strike_often_in_a_step_leave_room_for_the_next() -> None:
     """Contacts that have struck filled the table of contacts, and the run stopped."""
-    run = simulate(spinning_pair((772.3008, 203.9584), (-0.02036525, 0.0522, 0.1073), 37.9305))
+    run = simulate(spinning_pair((772.3008, 203.9584), [-0.02036525, 0.0522, 0.1073], 37.9305))
     assert len(run.impacts.step) > 2
     assert certify(run).passed
     assert np.ptp(run.energy["kinetic"]) < run.energy["kinetic"][0]
@@ -233,6 +237,6 @@ def test_corners_that_strike_often_in_a_step_leave_room_for_the_next() -> None:
 
 def test_corners_that_turn_past_each_other_are_not_taken_for_a_passage() -> None:
     """Seen from a body that turns, the way of the other is an arc: by Coriolis, too."""
-    run = simulate(spinning_pair((329.25, 852.671), (-0.01064, 0.051, 0.558), 35.28))
+    run = simulate(spinning_pair((329.25, 852.671), [-0.01064, 0.051, 0.558], 35.28))
     assert not len(run.impacts.step)
     assert not run.distrust
