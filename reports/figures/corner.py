@@ -8,11 +8,10 @@ Lengths are in metres and angles in radians, unless a name says otherwise.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from iapb.run import Run
 from reports.figures.figure import Drawn, Panel, Recipe, recipe
@@ -22,7 +21,6 @@ from verification.scenes import measures
 from verification.scenes.measures import Trace
 from verification.table import titled
 
-Floats = NDArray[np.float64]
 Traces = Mapping[str, Trace]
 Measured = Mapping[str, Mapping[str, Any]]
 
@@ -54,14 +52,12 @@ DEGREES = 180.0 / np.pi
 _COORDINATES = (("x", "mm", MILLI), ("y", "mm", MILLI), ("θ", "°", DEGREES))
 _FORCES = (("Fx", "N"), ("Fy", "N"), ("torque", "N m"))
 _BEFORE_CONTACT = 0.05  # [s] of the approach that a path shows
-# [s] from the first contact: the impulses of all worlds, separately visible
-_AT_CONTACT = (-0.01, 0.14)
+# [s] before and after the first contact: the impulses of all worlds, separately visible
+_LEAD = 0.01
+_TAIL = 0.14
 # of the run: long after the last impact of any world, the mean is the balance of forces
 _LAST_PART = 0.2
 _MARKS = 9  # markers along a curve: enough to identify it in grey print, few enough to see the line
-# share of the largest distance between curves at which they are seen to part, and to stay at rest
-_APART = 0.05
-_LEAD = 5  # steps before the curves part that are shown
 # a pulse has no counterpart if none of this share of it is within so many steps around it
 _NEAR = 11
 _SMALL = 0.1
@@ -96,11 +92,8 @@ def _figure(
             curve: measured_of(named[curve], trace, traces.get("ideal"), window)
             for curve, trace in traces.items()
         }
-        panels = (
-            _forces(key, traces)
-            if forces
-            else [*_path(key, {curve: named[curve] for curve in runs}), *_motions(key, traces)]
-        )
+        drawing = _forces if forces else _paths
+        panels = drawing(key, traces, window)
         columns = {**shown, **(_REST if shown is _DISTANCES else {})}
         rows = [(curve, *(each[name] for name in columns)) for curve, each in measured.items()]
         return Drawn(
@@ -226,106 +219,65 @@ def _same_13(m: Measured) -> dict[str, bool]:
 # The drawings
 
 
-def _marks(count: int, number: int) -> tuple[int, int]:
-    """Return matplotlib's `markevery` (first, every), with which coinciding curves show their
-    markers side by side."""
-    every = max(count // _MARKS, 1)
-    return (number * every // 5) % every, every
-
-
-def _first_shown(runs: Mapping[str, Run]) -> int:
-    """Return the first step of the paths; up to the first contact of any run all paths are the same
-    line."""
-    touching = [
-        int(np.flatnonzero(np.diff(run.contacts.offsets))[0])
-        for run in runs.values()
-        if len(run.contacts.gap)
-    ]
-    lead = round(_BEFORE_CONTACT / next(iter(runs.values())).dt)
-    return max(min(touching) - lead, 0) if touching else 0
-
-
-def _path(key: str, runs: Mapping[str, Run]) -> list[Panel]:
-    """Draw y against x of the device, from shortly before the first contact."""
-    first = _first_shown(runs)
-    with Plot(f"{key}-path", kind=PATH) as plot:
-        for number, (curve, run) in enumerate(runs.items()):
-            x, y = MILLI * run.device_q[first:, :2].T
-            marks = _marks(len(x), number)
-            look = line_arguments(STYLES[curve])
-            plot.axes.plot(x, y, **look, markevery=marks, zorder=3 + number / 10)
-        plot.axes.set(xlabel="x [mm]", ylabel="y [mm]")
-        plot.axes.xaxis.set_inverted(True)
-        plot.axes.yaxis.set_inverted(True)
-        note(plot.axes, (x[0], y[0]), "start", (0, 8), fontsize=8, color=MUTED)
-    told = f"Paths of the hand in the plane, in mm: {', '.join(runs)}."
-    return [Panel(plot.svg, told, "path of the hand, from just before contact")]
-
-
-def _motions(key: str, traces: Traces) -> list[Panel]:
-    """Draw the three coordinates from where the curves differ."""
-    panels = []
+def _paths(key: str, traces: Traces, window: slice) -> list[Panel]:
+    """Draw y against x of the device, from shortly before the first contact, and each coordinate
+    from then on until all worlds rest."""
+    approach = slice(_before(_BEFORE_CONTACT, traces, window), None)
+    paths = {curve: MILLI * trace.device[approach, :2].T for curve, trace in traces.items()}
+    label = "path of the hand, from just before contact"
+    panels = [_panel(f"{key}-path", PATH, paths, "x [mm]", "y [mm]", label)]
     for k, (name, unit, factor) in enumerate(_COORDINATES):
-        values = {curve: factor * trace.device[:, k] for curve, trace in traces.items()}
-        shown = _seen_apart([*values.values()])
-        label = f"{name}, from where they differ"
-        panels.append(_over_time(f"{key}-{k}", traces, values, f"{name} [{unit}]", label, shown))
+        curves = {
+            curve: (trace.time[window], factor * trace.device[window, k])
+            for curve, trace in traces.items()
+        }
+        label = f"{name}, from the first contact until all rest"
+        panels.append(_panel(f"{key}-{k}", TIME, curves, "t [s]", f"{name} [{unit}]", label))
     return panels
 
 
-def _seen_apart(values: Sequence[Floats]) -> slice:
-    """Return the steps from just before the curves part until all are at rest."""
-    every = np.array(values)
-    spread = np.ptp(every, axis=0)
-    seen = _APART * spread.max()
-    parted = int(np.argmax(spread > seen))
-    rest = np.flatnonzero((np.abs(every - every[:, -1:]) > seen).any(axis=0)).max(initial=parted)
-    return slice(max(parted - _LEAD, 0), int(rest) + int(rest - parted) // 10 + 2)
-
-
-def _forces(key: str, traces: Traces) -> list[Panel]:
+def _forces(key: str, traces: Traces, window: slice) -> list[Panel]:
     """Draw the forces along x and y at the first contact."""
-    window = measures.comparison_window([*traces.values()])
-    dt = next(iter(traces.values())).dt
-    first, last = (window.start + round(seconds / dt) for seconds in _AT_CONTACT)
+    shown = slice(_before(_LEAD, traces, window), _before(-_TAIL, traces, window))
     panels = []
     for k, (name, unit) in enumerate(_FORCES[:2]):
-        values = {curve: trace.device_force[:, k] for curve, trace in traces.items()}
-        label = f"{name}, {np.ptp(_AT_CONTACT):.2g} s around the first contact"
-        shown = slice(max(first, 0), last)
+        curves = {
+            curve: (trace.time[shown], trace.device_force[shown, k])
+            for curve, trace in traces.items()
+        }
+        label = f"{name}, {_LEAD + _TAIL:.2g} s around the first contact"
+        axis = f"{name} [{unit}]"
         panels.append(
-            _over_time(
-                f"{key}-{k}",
-                traces,
-                values,
-                f"{name} [{unit}]",
-                label,
-                shown,
-                drawstyle="steps-post",
-            )
+            _panel(f"{key}-{k}", TIME, curves, "t [s]", axis, label, drawstyle="steps-post")
         )
     return panels
 
 
-def _over_time(
-    key: str,
-    traces: Traces,
-    values: Mapping[str, Floats],
-    axis: str,
-    label: str,
-    shown: slice,
-    **how: Any,
+def _before(seconds: float, traces: Traces, window: slice) -> int:
+    """Return the state at a time before the window begins."""
+    dt = next(iter(traces.values())).dt
+    return max(window.start - round(seconds / dt), 0)
+
+
+def _panel(
+    key: str, kind: str, curves: Mapping[str, Any], x: str, y: str, label: str, **how: Any
 ) -> Panel:
-    """Draw a quantity of each run over the time of some steps."""
-    time = next(iter(traces.values())).time[shown]
-    with Plot(key, kind=TIME) as plot:
-        for number, (curve, whole) in enumerate(values.items()):
-            part = whole[shown]
+    """Draw the curves (x, y) by name; where curves coincide, their markers stand side by side."""
+    with Plot(key, kind=kind) as plot:
+        for number, (curve, points) in enumerate(curves.items()):
+            every = max(len(points[0]) // _MARKS, 1)
+            first = (number * every // 5) % every
             look = line_arguments(STYLES[curve]) | how
-            marks = _marks(len(part), number)
-            plot.axes.plot(time[: len(part)], part, **look, markevery=marks, zorder=3 + number / 10)
-        plot.axes.set(xlabel="t [s]", ylabel=axis, xlim=time[[0, -1]])
-    return Panel(plot.svg, f"{axis} over time: {', '.join(values)}.", label)
+            plot.axes.plot(*points, **look, markevery=(first, every), zorder=3 + number / 10)
+        plot.axes.set(xlabel=x, ylabel=y)
+        if kind == TIME:
+            plot.axes.margins(x=0.0)
+        else:
+            plot.axes.invert_xaxis()
+            plot.axes.invert_yaxis()
+            start = next(iter(curves.values()))[:, 0]
+            note(plot.axes, start, "start", (0, 8), fontsize=8, color=MUTED)
+    return Panel(plot.svg, f"{y} over {x}: {', '.join(curves)}.", label)
 
 
 _figure(7, UNLIMITED, False, _DISTANCES, _same_7)
