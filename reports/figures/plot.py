@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from types import TracebackType
 from typing import Any
 
@@ -14,13 +15,13 @@ from reports.figures.numbers import power_of_ten
 from reports.figures.style import (
     FORCE,
     PANEL,
-    PARAMETERS,
     VARIABLES,
     LineStyle,
     css,
     line_arguments,
 )
 
+_STYLE = Path(__file__).with_name("report.mplstyle")
 # the cursor reads curves over time
 TIME = "time"
 PATH = "path"
@@ -69,7 +70,7 @@ class Plot:
         import matplotlib
         from matplotlib.figure import Figure
 
-        self._style = matplotlib.rc_context(PARAMETERS)
+        self._style = matplotlib.rc_context(fname=_STYLE)
         self._style.__enter__()
         self.drawing = Figure(
             figsize=self.size, dpi=72, layout=None if self.bare else "constrained"
