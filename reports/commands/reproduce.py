@@ -31,7 +31,7 @@ from reports.numbers_file import read_numbers
 from reports.pages.builder import build_report, draw_all, figure_inputs, figure_page
 from reports.pages.first import count_claims
 from reports.pages.records import FailedCases
-from reports.report import keep_answer, kept_answer, report_key, write_companions, write_report
+from reports.report import write_companions, write_report
 from reports.runner import Runner
 from reports.show import Answer, Json, stage_progress
 from reports.store.io import write_whole
@@ -77,16 +77,8 @@ def reproduce(
 
 def make_report(out: Path, depth: str) -> Answer:
     """Compute all evidence or read stored results, write the report and its companion files, return
-    the verdicts.
-
-    If nothing that the report is made from has changed since the last call, its answer is given
-    again.
-    """
+    the verdicts."""
     started = time.perf_counter()
-    key = report_key(out, depth)
-    if (kept := kept_answer(out, key)) is not None:
-        facts, lines = kept
-        return Answer(facts, [*lines, "Nothing that it is made from has changed since."])
     with stage_progress() as progress:
         evidence = gather(out, depth, progress)
     gathered = time.perf_counter()
@@ -121,11 +113,7 @@ def make_report(out: Path, depth: str) -> Answer:
         "answers": answers,
         "failed": failed,
     }
-    if failed:
-        return Answer(facts, lines, 1)
-    tables = [path.relative_to(out).as_posix() for path in (out / "tables").glob("*.h5")]
-    keep_answer(out, key, facts, lines, [*(f"runs/{run.file}" for run in evidence.runs), *tables])
-    return Answer(facts, lines)
+    return Answer(facts, lines, int(bool(failed)))
 
 
 def _line_of(topic: Finding) -> str:

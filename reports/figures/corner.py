@@ -15,7 +15,7 @@ import numpy as np
 
 from iapb.run import Run
 from reports.figures.figure import Drawn, Panel, Recipe, recipe
-from reports.figures.plot import PATH, TIME, Plot, note
+from reports.figures.plot import Plot, note
 from reports.figures.style import MUTED, STYLES, line_arguments
 from verification.scenes import measures
 from verification.scenes.measures import Trace
@@ -65,6 +65,7 @@ _LARGE = 10.0  # times the force that is held: a pulse
 _BALANCED = 0.01  # share of the hand's force
 _DIGITS = 9  # of millimetres: a picometre and less is rounding of the coordinates, not motion
 
+_TIME = "t [s]"
 _DISTANCES = {"x": "x from ideal [mm]", "y": "y from ideal [mm]", "angle": "θ from ideal [°]"}
 _DEVICE = {"settled": "at rest after [s]", "bounces": "bounces", "depth": "sinks in [mm]"}
 _PEAKS = {"Fx": "largest |Fx| [N]", "Fy": "largest |Fy| [N]", "torque": "largest |τ| [N m]"}
@@ -225,14 +226,14 @@ def _paths(key: str, traces: Traces, window: slice) -> list[Panel]:
     approach = slice(_before(_BEFORE_CONTACT, traces, window), None)
     paths = {curve: MILLI * trace.device[approach, :2].T for curve, trace in traces.items()}
     label = "path of the hand, from just before contact"
-    panels = [_panel(f"{key}-path", PATH, paths, "x [mm]", "y [mm]", label)]
+    panels = [_panel(f"{key}-path", paths, "x [mm]", "y [mm]", label)]
     for k, (name, unit, factor) in enumerate(_COORDINATES):
         curves = {
             curve: (trace.time[window], factor * trace.device[window, k])
             for curve, trace in traces.items()
         }
         label = f"{name}, from the first contact until all rest"
-        panels.append(_panel(f"{key}-{k}", TIME, curves, "t [s]", f"{name} [{unit}]", label))
+        panels.append(_panel(f"{key}-{k}", curves, _TIME, f"{name} [{unit}]", label))
     return panels
 
 
@@ -247,9 +248,7 @@ def _forces(key: str, traces: Traces, window: slice) -> list[Panel]:
         }
         label = f"{name}, {_LEAD + _TAIL:.2g} s around the first contact"
         axis = f"{name} [{unit}]"
-        panels.append(
-            _panel(f"{key}-{k}", TIME, curves, "t [s]", axis, label, drawstyle="steps-post")
-        )
+        panels.append(_panel(f"{key}-{k}", curves, _TIME, axis, label, drawstyle="steps-post"))
     return panels
 
 
@@ -259,18 +258,16 @@ def _before(seconds: float, traces: Traces, window: slice) -> int:
     return max(window.start - round(seconds / dt), 0)
 
 
-def _panel(
-    key: str, kind: str, curves: Mapping[str, Any], x: str, y: str, label: str, **how: Any
-) -> Panel:
+def _panel(key: str, curves: Mapping[str, Any], x: str, y: str, label: str, **how: Any) -> Panel:
     """Draw the curves (x, y) by name; where curves coincide, their markers stand side by side."""
-    with Plot(key, kind=kind) as plot:
+    with Plot(key) as plot:
         for number, (curve, points) in enumerate(curves.items()):
             every = max(len(points[0]) // _MARKS, 1)
             first = (number * every // 5) % every
             look = line_arguments(STYLES[curve]) | how
             plot.axes.plot(*points, **look, markevery=(first, every), zorder=3 + number / 10)
         plot.axes.set(xlabel=x, ylabel=y)
-        if kind == TIME:
+        if x == _TIME:
             plot.axes.margins(x=0.0)
         else:
             plot.axes.invert_xaxis()

@@ -24,16 +24,16 @@ _ERRORS = (1e-5, 10.0)  # [lengths of the body]
 def motions(table: Table) -> Drawn:
     """Draw a panel for each scene, all with the same axes, and a curve for each world."""
     tried = table.column("method")
-    looks = {world: STYLES[name] for world, name in _NAMES.items() if world in tried}
+    names = {world: name for world, name in _NAMES.items() if world in tried}
     spent = [run["time"] for run in motion.runs_of(table)]
     ends = min(spent) / 2.0, max(*spent, _REAL_TIME) * 2.0
     panels = []
     for number, scene in enumerate(dict.fromkeys(table.column("scene"))):
         with Plot(f"motions-{number}") as plot:
             plot.axes.axvline(_REAL_TIME, color=MUTED, linewidth=1.0, linestyle=(0, (1.4, 1.4)))
-            for world, look in looks.items():
+            for world, name in names.items():
                 runs = motion.runs_of(table, scene=scene, method=world)
-                plot.curve([(run["time"], run["position"]) for run in runs], look)
+                plot.curve([(run["time"], run["position"]) for run in runs], STYLES[name])
             plot.log(
                 "computing time [ms per simulated second]",
                 "error [lengths of the body]",
@@ -44,4 +44,4 @@ def motions(table: Table) -> Drawn:
         least = min(motion.runs_of(table, scene=scene), key=lambda run: float(run["position"]))
         told = f"{scene}: error against time; the smallest is {least['position']:.1g}, by {least['method']}."
         panels.append(Panel(plot.svg, told, scene))
-    return Drawn(panels, table, {look.name: look for look in looks.values()})
+    return Drawn(panels, table, {name: STYLES[name] for name in names.values()})

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from reports.figures.figure import Drawn, Panel, recipe
 from reports.figures.plot import Plot, note
 from reports.figures.style import MUTED, STYLES, LineStyle
@@ -21,7 +19,7 @@ def the_failure(numbers: Table) -> Drawn:
         for world in dict.fromkeys(numbers["world"]):
             shown = numbers.where(world=world).select(("time", "kinetic energy")).rows
             words = WORDS.get(world, world)
-            look = replace(STYLES[world], name=words)
+            look = STYLES[world]
             plot.curve(shown, look, marked=False)
             share, offset = _NAMES_AT.get(world, (0.5, (0.0, 8.0)))
             place = min(shown, key=lambda point: abs(point[0] - share * shown[-1][0]))
@@ -33,7 +31,7 @@ def the_failure(numbers: Table) -> Drawn:
 
 _RULES = {
     "error, impacts at the touch": STYLES["IAPB"],
-    "error, impacts at the step": LineStyle(MUTED, "s", (5, 1.6), name="impacts at steps"),
+    "error, impacts at the step": LineStyle(MUTED, "s", (5, 1.6)),
     "error of MuJoCo": STYLES["MuJoCo"],
 }
 _TITLES = {

@@ -22,12 +22,6 @@ from reports.figures.style import (
 )
 
 _STYLE = Path(__file__).with_name("report.mplstyle")
-# the cursor reads curves over time
-TIME = "time"
-PATH = "path"
-TOLERANCE = (
-    0.01  # points, 1/30000 of the width of a panel: peaks and corners stay, straight runs go
-)
 LARGEST_ENLARGEMENT = 1.35  # wider drawings would have too large letters
 
 
@@ -38,7 +32,6 @@ class Plot:
     ----------
     key : key of the panel, unique in the page; the identifiers of its SVG contain it
     size : width and height [inches]
-    kind : TIME or PATH if the page's script reads values from the curves
     bare : whether to hide the axes: a canvas for shapes, by default as large as the drawing
     shape : rows and columns of axes, placed by the layout
 
@@ -53,13 +46,11 @@ class Plot:
         key: str,
         size: tuple[float, float] = PANEL,
         *,
-        kind: str = "",
         bare: bool = False,
         shape: tuple[int, int] = (1, 1),
     ) -> None:
         self.key = key
         self.size = size
-        self.kind = kind
         self.bare = bare
         self.shape = shape
         self.svg = ""
@@ -90,34 +81,8 @@ class Plot:
         trace: TracebackType | None,
     ) -> None:
         if error is None:
-            self.svg = self._traced() if self.kind else to_svg(self.drawing, self.key)
+            self.svg = to_svg(self.drawing, self.key)
         self._style.__exit__(kind, error, trace)
-
-    def _traced(self) -> str:
-        """Return the SVG with what the page's script reads values with: the frame in points, limits
-        and names."""
-        import matplotlib
-
-        matplotlib.rcParams["path.simplify_threshold"] = TOLERANCE
-        for line in self.axes.lines:
-            line.get_path().simplify_threshold = TOLERANCE
-        svg = to_svg(self.drawing, self.key)
-        place = self.axes.get_position()
-        (width, height) = 72.0 * self.drawing.get_size_inches()
-        frame = (
-            width * place.x0,
-            height * (1.0 - place.y1),
-            width * place.x1,
-            height * (1.0 - place.y0),
-        )
-        ranges = {"frame": frame, "x": self.axes.get_xlim(), "y": self.axes.get_ylim()}
-        told = {
-            "trace": self.kind,
-            "names": f"{self.axes.get_xlabel()}|{self.axes.get_ylabel()}",
-            **{key: " ".join(f"{value:.7g}" for value in values) for key, values in ranges.items()},
-        }
-        attributes = " ".join(f'data-{key}="{value}"' for key, value in told.items())
-        return svg.replace("<svg ", f"<svg {attributes} ", 1)
 
     def curve(
         self, points: Iterable[tuple[Any, Any]], look: LineStyle, *, marked: bool = True, **how: Any
@@ -200,7 +165,6 @@ def _styled_once(run: re.Match[str]) -> str:
 _CLEANED: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
     # a <style> would leak into the page
     (r"(?s)(?:<metadata>.*?</metadata>|<!--.*?-->|<defs>\s*<style.*?</style>\s*</defs>)\s*", ""),
-    (r'\sid="curve=([^"]*)"', r' data-curve="\1"'),  # what a gid tells the page's script
     # coordinates are inside of tags; the numbers between them are for people
     (
         r"<[^>]+>",

@@ -8,7 +8,7 @@ mode can use other colours.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import cycle
 from typing import Any
 
@@ -64,7 +64,6 @@ class LineStyle:
     dash: tuple[float, ...] = ()
     width: float = 1.5
     filled: bool = True
-    name: str = ""  # name of the curve, in the drawing and in its legend
 
 
 # All styles differ, and each method, world or quantity has the same style in every figure. No other
@@ -98,7 +97,6 @@ _SAME = {
     "MuJoCo, from Python": "MuJoCo",
 }
 STYLES |= {name: STYLES[same] for name, same in _SAME.items()}
-STYLES = {name: replace(look, name=name) for name, look in STYLES.items()}
 
 BOUND = LineStyle(INK, "", (4, 2), 1.2)  # what is measured against: a bound, the value before
 
@@ -125,15 +123,12 @@ PANEL = (4.1, 3.0)  # inches: two or three of them stand beside each other on a 
 def looks_of(names: Iterable[str]) -> dict[str, LineStyle]:
     """Return the style of each name: its own style if it has one, else the next of OTHERS."""
     others = cycle(OTHERS)
-    return {
-        name: STYLES.get(name) or replace(next(others), name=name) for name in dict.fromkeys(names)
-    }
+    return {name: STYLES.get(name) or next(others) for name in dict.fromkeys(names)}
 
 
 def line_arguments(style: LineStyle, *, marked: bool = True) -> dict[str, Any]:
     """Return the keyword arguments with which matplotlib draws a curve of this style."""
     return {
-        **({"gid": f"curve={style.name}"} if style.name else {}),
         "color": style.color,
         "linewidth": style.width,
         "linestyle": (0, style.dash) if style.dash else "-",

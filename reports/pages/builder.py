@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import base64
-import hashlib
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from importlib.resources import files
 from posixpath import dirname, relpath
 from typing import Any
 
@@ -32,8 +29,6 @@ from verification.claims.socket import JUMP
 from verification.claims.walls import BOTH, SOONER
 from verification.claims.walls import SETTLES as SETTLED
 from verification.finding import Failure, Finding, Part
-from verification.numbers import NUMBERS, TIMES
-from verification.table import Table
 
 # Largest number of table rows on a page, to keep it small; numbers.json has all of them.
 ROWS_SHOWN = 200
@@ -113,27 +108,16 @@ def build_report(
 ) -> dict[str, str]:
     """Return the HTML of the ten pages by file name, the first page first.
 
-    Missing evidence is printed as "not computed in this run". Every page links to the others and
-    needs neither network nor script.
+    Missing evidence is printed as "not computed in this run". Every page links to the others; it
+    runs no script and asks for nothing.
     """
     given = tuple(drawn)
     environment = _environment()
-    text = (
-        '(() => {\n"use strict";\n'
-        + files(__package__).joinpath("scripts/page.js").read_text("utf-8")
-        + "})();\n"
-    )
-    digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
-    # The browser runs only this script and makes no requests; without the script the page is
-    # complete.
-    policy = f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'"
     bare = {
         key: Figure(key, words.get("number", ""), words["title"]) for key, words in TEXTS.items()
     }
     shared = {
         "pages": PAGES,
-        "script": Markup(text),
-        "policy": policy,
         "evidence": evidence,
         "topics": {topic.key: topic for topic in evidence.topics},
         "numbers": numbers_of(evidence, QUOTED) | {"figures": figure_numbers(given)},
@@ -221,15 +205,6 @@ def unstated(parts: Iterable[Part], shown: Sequence[str]) -> list[Part]:
     return [part for part in every if part not in seen]
 
 
-def badge_words(topic: Finding) -> str:
-    """Return the summary of a topic for the first page: how many of its findings fail."""
-    failing = sum(part.verdict == finding.REFUTED for part in topic.parts)
-    total = len(topic.parts)
-    if failing and total > 1:
-        return f"{failing} of {total} findings {'fails' if failing == 1 else 'fail'}"
-    return FINDINGS[topic.verdict]
-
-
 def judged(part: Part) -> str:
     """Return the verdict on a part in words: whether its target is met, if it has one."""
     met = (
@@ -239,15 +214,6 @@ def judged(part: Part) -> str:
     )
     return (
         part.outcome if part.role or part.region else met.get(part.verdict, FINDINGS[part.verdict])
-    )
-
-
-def tables_without(topic: Finding, figures: Sequence[Figure]) -> tuple[tuple[str, Table], ...]:
-    """Return the names and tables of a topic that are neither drawn in a figure nor quoted."""
-    drawn = {name for figure in figures for name in figure.inputs}
-    drawn |= {f"{topic.key}/{name}" for name in (NUMBERS, TIMES)}
-    return tuple(
-        (name, table) for name, table in topic.tables.items() if f"{topic.key}/{name}" not in drawn
     )
 
 
@@ -268,8 +234,6 @@ def _environment() -> Environment:
         mark=OUTCOME_MARKS.__getitem__,
         outcome_class=OUTCOME_CLASSES.__getitem__,
         judged=judged,
-        badge_words=badge_words,
-        tables_without=tables_without,
         stated=stated,
         unstated=unstated,
         method_map=method_map,

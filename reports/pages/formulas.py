@@ -8,8 +8,6 @@ import re
 from markupsafe import Markup, escape
 
 _INLINE = re.compile(r"\$([^$]+)\$")
-_REFERENCE = re.compile(r"&#x([0-9A-Fa-f]+);")
-_GROUP_OF_ONE = re.compile(r"<mrow>(<(m[ion])>[^<]*</\2>)</mrow>")
 _POWER = re.compile(r"(?<![\w.])(-?\d(?:\.\d+)?)e([+-]?\d{1,3})(?!\w)")
 _NEGATIVE = re.compile(r"(?<![\w.-])-(?=\d)")
 
@@ -18,15 +16,7 @@ def formula(latex: str, display: str = "block") -> Markup:
     """Return the MathML of a formula."""
     from latex2mathml.converter import convert
 
-    return Markup(_shortened(convert(latex, display=display)))
-
-
-def _shortened(mathml: str) -> str:
-    """Return the same formula in half the bytes: plain characters, no groups of one element, no
-    implied namespace."""
-    text = _REFERENCE.sub(lambda reference: str(escape(chr(int(reference.group(1), 16)))), mathml)
-    text = _GROUP_OF_ONE.sub(r"\1", text.replace(' xmlns="http://www.w3.org/1998/Math/MathML"', ""))
-    return text.replace('<mspace width="0.167em" />', '<mspace width=".17em"/>')
+    return Markup(convert(latex, display=display))
 
 
 def prose(text: str) -> Markup:
