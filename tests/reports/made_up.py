@@ -1,16 +1,19 @@
-"""Made-up runs and motions: every array filled, nothing simulated."""
+"""A made-up run with every array filled, and inputs of the figures."""
 
-from dataclasses import replace
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 
 from iapb import find_scene, load_scene
 from iapb.numerics.schema import blank, quantities
 from iapb.run import ContactTable, EffectRow, ImpactTable, Run
-from iapb.scene.mechanism import mechanism_of
+from reference.worlds import run_world
+from reports.evidence.runs import CORNER_SCENE, FIGURE_RUNS, TILTED, corner_scene
+from reports.figures.corner import UNLIMITED
+from reports.figures.paper import arm_energies
+from reports.numbers_file import read_numbers
 
-STEPS = 128
-UNTOUCHED = 40
 NAMES = ("peg.x", "peg.y", "peg.theta")
 TEXTS = {
     "scene_name": "peg",
@@ -94,35 +97,18 @@ def made_run(steps=20, contacts=7, impacts=3, seed=0, **fields):
     return Run(**{**values, **fields})
 
 
-def made_motion(scene, seed):
-    """A made-up motion of a shipped scene: every coordinate swings about its start, some contacts
-    and impacts."""
-    loaded = load_scene(find_scene(scene))
-    resolved = loaded.resolved()
-    start = np.concatenate(
-        [np.asarray(body["position"], dtype=float) for body in resolved["bodies"]]
-    )
-    time = np.arange(STEPS + 1) / 512
-    swing = 0.002 * np.sin(np.outer(40 * time, 1 + 0.1 * seed + np.arange(len(start))))
-    pose = mechanism_of(loaded).poses(start + swing, planar=True)
-    run = made_run(
-        steps=STEPS,
-        contacts=60,
-        impacts=5,
-        seed=seed,
-        time=time,
-        q=start + swing,
-        pose=pose,
-        scene_name=scene,
-        scene_resolved=resolved,
-    )
-    late = np.where(
-        np.arange(STEPS + 1) < UNTOUCHED, 0, run.contacts.offsets
-    )  # nothing touches before
-    run = replace(
-        run, contacts=replace(run.contacts, offsets=late, point=0.01 * run.contacts.point)
-    )
-    force = np.sin(np.outer(30 * time[1:] + seed, [1.0, 2.0, 3.0])) * [1.0, 1.0, 0.02]
-    return replace(
-        run, device_force=force, device_q=0.01 * np.sin(np.outer(20 * time + seed, [1.0, 2.0, 3.0]))
-    )
+@cache
+def figure_inputs():
+    """The inputs of all figures: tables of a report, thinned, and runs of the peg that differ in the
+    stiffness of the walls."""
+    tables = read_numbers(Path(__file__).with_name("figures.json")).tables
+    peg = load_scene(find_scene("peg_corner")).with_values({"duration": 1.0})
+    runs = {
+        name: run_world(peg.with_values({"contact.stiffness": 900.0 + 50.0 * k}), "IAPB")
+        for k, name in enumerate(FIGURE_RUNS)
+    }
+    worlds = {name: runs[f"corner/{name}"] for name in UNLIMITED}
+    worlds["IAPB-push"] = runs["corner/IAPB-spread"]
+    tilted = {TILTED: dict.fromkeys((0.0, 0.015, 0.2), worlds)}
+    scene = {CORNER_SCENE: corner_scene(), "arm_energies": arm_energies()}
+    return {**tables, **runs, **tilted, **scene}

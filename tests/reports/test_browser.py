@@ -1,7 +1,7 @@
 """The report of made-up records as a reader meets it in a browser that is cut off from everything
 but its pages.
 
-Wide and narrow, light and dark, by keyboard, on paper, without script; curves.
+Wide and narrow, light and dark.
 Without a browser the tests are skipped, and say so.
 """
 
@@ -9,17 +9,13 @@ import shutil
 from contextlib import contextmanager
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from reports.evidence.runs import TILTED
 from reports.figures import RECIPES
-from reports.figures.corner import UNLIMITED
-from reports.figures.paper import arm_energies
 from reports.pages.builder import build_report, draw_all
 from reports.pages.records import Evidence
 from reports.report import write_report
-from tests.reports.made_up import made_motion
+from tests.reports.made_up import figure_inputs
 from verification.finding import MIXED, REPRODUCED, Part, finding_of
 from verification.table import titled
 
@@ -83,31 +79,14 @@ PALE = """(least) => {
     }
     return found;
 }"""
-READ = """() => [...document.querySelector("#fig07 .readout:not([hidden])").children]
-    .map((row) => [row.firstChild.textContent, row.querySelector("b").textContent])"""
 
 
 @pytest.fixture(scope="module")
 def evidence():
     """Made-up records: a little of each kind, wide tables and long words among them."""
-    names = sorted(
-        {
-            name
-            for recipe in RECIPES
-            if recipe.key in FIGURES
-            for name in recipe.needs
-            if "/" in name
-        }
-    )
-    runs = {name: made_motion("peg_corner", k) for k, name in enumerate(names)}
-    tilted = {
-        tilt: {name: runs[f"corner/{name}"] for name in UNLIMITED}
-        | {"IAPB-push": runs["corner/IAPB"]}
-        for tilt in (0.0, 0.015, 0.2)
-    }
     table = titled(tuple(f"a long heading {k}" for k in range(12)), (("word", *range(11)),))
     return Evidence(
-        inputs={**runs, TILTED: tilted, "arm_energies": arm_energies()},
+        inputs=figure_inputs(),
         claims=(
             finding_of(
                 "C01",
@@ -258,45 +237,3 @@ def test_all_text_can_be_read(see, first, scheme):
                 "() => document.querySelectorAll('details').forEach((part) => { part.open = true; })"
             )
             assert sight.ask(PALE, LEAST_CONTRAST) == {}
-
-
-def test_without_script_the_content_is_there(see):
-    with see(size=PHONE, java_script_enabled=False) as sight:
-        page = sight.page
-        assert (
-            page.locator("figure").count() == 8
-            and page.locator("#fig07 [data-curve] path").count() > 0
-        )
-        assert page.locator("button:visible, input:visible").count() == 0 and sight.errors == []
-
-
-def test_a_world_can_be_hidden_and_shown(desk):
-    desk.ask("() => document.querySelectorAll('details').forEach((part) => { part.open = true; })")
-    button = desk.page.locator("#fig07 .legend button", has_text="PB").filter(has_not_text="IAPB")
-    curves = desk.page.locator("#fig07 [data-trace] [data-curve='PB']")
-    assert curves.count() > 1 and curves.first.is_visible()
-    button.click()
-    assert button.get_attribute("aria-pressed") == "false"
-    assert not any(curve.is_visible() for curve in curves.all())
-    assert desk.page.locator("#fig07 [data-trace] [data-curve='IAPB']").first.is_visible()
-    button.press("Enter")
-    assert all(curve.is_visible() for curve in curves.all())
-
-
-def test_the_cursor_reads_the_values_of_the_run(desk, evidence):
-    """To within what the drawing keeps: 0.02 of its 180 points of height; the cursor stands between
-    two steps."""
-    desk.ask("() => document.querySelectorAll('details').forEach((part) => { part.open = true; })")
-    plot = desk.page.locator("#fig07 svg[data-trace=time]").first
-    plot.scroll_into_view_if_needed()
-    box = plot.bounding_box()
-    desk.page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.4 * box["height"])
-    rows = {name: value.replace("\N{MINUS SIGN}", "-") for name, value in desk.ask(READ)}
-    run = evidence.inputs["corner/ideal"]
-    x = 1e3 * run.device_q[:, 0]
-    near = x[np.abs(run.time - float(rows["t [s]"])) < 1.1 * run.dt]
-    kept = np.ptp(x) * 0.02 / 180
-    assert near.min() - kept <= float(rows["ideal"]) <= near.max() + kept
-    assert np.ptp(near) < np.ptp(x) / 10  # or the bracket would say nothing
-    # The panels over time read together.
-    assert desk.page.locator("#fig07 .readout:visible").count() == 3

@@ -12,7 +12,7 @@ import pytest
 
 from iapb.scene import find_scene, load_scene
 from reports import provenance
-from reports.crate import CRATE_NAME, PROFILE
+from reports.crate import CRATE_NAME
 from reports.evidence import gather
 from reports.evidence.stage import Stage
 from reports.figures.figure import Figure, Panel
@@ -78,7 +78,7 @@ def test_the_crate_says_what_ro_crate_1_1_asks_for_and_names_the_report_the_numb
     out,
 ):
     crate = json.loads((out / CRATE_NAME).read_text())
-    assert crate["@context"] == f"{PROFILE}/context"
+    assert crate["@context"] == "https://w3id.org/ro/crate/1.1/context"
     entities = {entity["@id"]: entity for entity in crate["@graph"]}
     assert len(entities) == len(crate["@graph"]) and entities[CRATE_NAME]["about"] == {"@id": "./"}
     named = {name for name in references(crate["@graph"]) if not name.startswith("https")}

@@ -2,7 +2,6 @@
 stage, and is named."""
 
 import io
-import json
 import math
 import os
 import subprocess
@@ -26,7 +25,6 @@ from reports.figures.figure import Recipe
 from reports.pages.builder import build_report
 from reports.pages.records import Evidence, FailedCases
 from reports.provenance import linear_algebra
-from reports.report import keep_answer, kept_answer, report_key
 from reports.runner import Runner
 from reports.store import keys
 from reports.store.io import sealed
@@ -343,25 +341,3 @@ def test_the_last_lines_say_what_failed_and_where_the_traceback_is(monkeypatch, 
     assert "in fails" in (tmp_path / "tables" / "figures-failed.txt").read_text(encoding="utf-8")
     assert "C22: ValueError: planted" in (tmp_path / "report" / "data.html").read_text("utf-8")
     assert "Not computed in this run" in (tmp_path / "report.html").read_text("utf-8")
-    assert not (tmp_path / "tables" / "answer.json").exists()  # the next call tries again
-
-
-def test_an_unchanged_report_keeps_its_answer_and_a_changed_one_does_not(tmp_path):
-    (tmp_path / "tables").mkdir()
-    for name in ("report.html", "runs.h5"):
-        (tmp_path / name).write_text(name)
-    key = report_key(tmp_path, "quick")
-    assert kept_answer(tmp_path, key) is None and report_key(tmp_path, "full") != key
-    for change in (
-        lambda: (tmp_path / "report.html").write_text("other"),
-        (tmp_path / "runs.h5").unlink,
-        lambda: (tmp_path / "tables/answer.json").write_text("{"),
-    ):
-        keep_answer(tmp_path, key, {"page": tmp_path}, ["said"], ["runs.h5"])
-        assert kept_answer(tmp_path, key) == (
-            json.loads(json.dumps({"page": str(tmp_path)})),
-            ["said"],
-        )
-        assert kept_answer(tmp_path, "another") is None
-        change()
-        assert kept_answer(tmp_path, key) is None

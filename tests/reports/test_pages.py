@@ -1,7 +1,5 @@
 """The pages: whole, self-contained, honest about what is missing, and of one voice."""
 
-import base64
-import hashlib
 import re
 from html.parser import HTMLParser
 from pathlib import Path
@@ -123,7 +121,7 @@ def pages(request):
     return made
 
 
-def test_each_page_is_well_formed_asks_for_nothing_and_runs_only_its_own_script(pages):
+def test_each_page_is_well_formed_asks_for_nothing_and_runs_no_script(pages):
     assert list(pages) == [page.file for page in PAGES] and len(pages) == 10
     outlines = {name.rpartition("/")[2]: Outline(page) for name, page in pages.items()}
     for name, page in pages.items():
@@ -137,12 +135,8 @@ def test_each_page_is_well_formed_asks_for_nothing_and_runs_only_its_own_script(
             assert not file or beside in (*pages, NUMBERS_NAME, CRATE_NAME)
         head = page.split("<main")[0]
         assert all(f"#{other.id}" in head for other in PAGES)
-        (script,) = re.findall(r"<script>(.*?)</script>", page, flags=re.S)
-        digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-        assert f"script-src &#39;sha256-{digest}&#39;" in page
-        assert not re.search(
-            r"\son\w+=|fetch\(|XMLHttpRequest|import\(|eval\(|@import|url\((?!#)", page
-        )
+        assert "<script" not in page and "default-src &#39;none&#39;" in head.replace("'", "&#39;")
+        assert not re.search(r"\son\w+=|@import|url\((?!#)", page)
 
 
 def test_a_link_to_an_id_of_no_page_is_an_error():
