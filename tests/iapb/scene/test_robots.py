@@ -110,16 +110,6 @@ def test_bounds_that_no_joint_reaches_are_none(
 
 
 @pytest.mark.parametrize(
-    "limit", ['<limit effort="1" velocity="2"/>', '<limit lower="1" upper="1"/>']
-)
-def test_a_range_of_one_point_is_refused_and_can_be_left_out(load: Load, limit: str) -> None:
-    turn = joint("turn", "finger", "revolute", limit)
-    assert "leave_out: {turn: [limit]}" in refusal(load, PALM, FINGER, turn)
-    scene = load(PALM, FINGER, turn, more="leave_out: {turn: [limit]}")
-    assert scene.bodies[1].joint_limits is None
-
-
-@pytest.mark.parametrize(
     ("inside", "named"),
     [
         ('<limit lower="1" upper="-1"/>', "leave_out: {slide: [limit]}"),
@@ -158,25 +148,6 @@ def test_what_a_joint_has_in_the_file_its_body_has(load: Load) -> None:
     assert not left["r_finger"].joint_damping and not left["r_finger"].joint_friction
 
 
-@pytest.mark.parametrize(
-    ("mimic", "kind"),
-    [
-        ('joint="none"', "prismatic"),
-        ('joint="follow"', "prismatic"),
-        ('joint="turn"', "prismatic"),
-        ('joint="slide"', "floating"),
-    ],
-)
-def test_what_no_joint_can_follow_is_refused_and_can_be_left_out(
-    load: Load, mimic: str, kind: str
-) -> None:
-    turn = joint("turn", "wheel", "continuous")
-    parts = PALM, FINGER, THUMB, link("wheel"), SLIDE, turn, follower(mimic, "", kind)
-    assert "leave_out: {follow: [mimic]}" in refusal(load, *parts)
-    thumb = load(*parts, more="leave_out: {follow: [mimic]}").bodies[1]
-    assert thumb.name == "r_thumb" and thumb.joint_mimic is None
-
-
 def test_a_start_follows_the_leader_and_stays_within_both_ranges(load: Load) -> None:
     parts = PALM, FINGER, THUMB, SLIDE
     scene = load(*parts, follower('joint="slide" offset="-0.05"'))
@@ -211,30 +182,65 @@ def test_one_remark_counts_what_has_no_effect(load: Load) -> None:
 # what cannot be simulated is refused, and can be left out
 
 
-def test_an_unknown_joint_type_is_refused_and_can_be_welded(load: Load) -> None:
-    screw = joint("bolt", "nut", "screw"), joint("tip", "end", "fixed", parent="nut")
-    parts = PALM, FINGER, link("nut"), link("end"), SLIDE, *screw
-    assert "leave_out: {bolt: [joint]}" in refusal(load, *parts)
-    scene = load(*parts, more="leave_out: {bolt: [joint]}")
-    assert [body.joint for body in scene.bodies] == ["fixed", "fixed", "fixed", "prismatic"]
+THUMBS = PALM, FINGER, THUMB, link("wheel"), SLIDE, joint("turn", "wheel", "continuous")
+ROD = PALM, FINGER, link("rod"), SLIDE, joint("a", "rod"), joint("b", "rod", parent="finger")
+BOLT = joint("bolt", "nut", "screw"), joint("tip", "end", "fixed", parent="nut")
+LEFT_OUT = [  # elements; joint and what of it cannot be simulated; a field of the bodies without it
+    *(
+        (
+            (PALM, FINGER, joint("turn", "finger", "revolute", limit)),
+            "turn: [limit]",
+            "joint_limits",
+            [None] * 2,
+        )
+        for limit in ('<limit effort="1" velocity="2"/>', '<limit lower="1" upper="1"/>')
+    ),
+    *(
+        (
+            (*THUMBS, follower(f'joint="{leader}"', "", kind)),
+            "follow: [mimic]",
+            "joint_mimic",
+            [None] * 4,
+        )
+        for leader, kind in (
+            ("none", "prismatic"),
+            ("follow", "prismatic"),
+            ("turn", "prismatic"),
+            ("slide", "floating"),
+        )
+    ),
+    *(
+        (
+            (PALM, FINGER, joint("move", "finger", kind, f'<dynamics {field}="1"/>')),
+            "move: [dynamics]",
+            f"joint_{field}",
+            [()] * 2,
+        )
+        for kind in ("planar", "floating")
+        for field in ("damping", "friction")
+    ),
+    (
+        (PALM, FINGER, link("nut"), link("end"), SLIDE, *BOLT),
+        "bolt: [joint]",
+        "joint",
+        ["fixed"] * 3 + ["prismatic"],
+    ),
+    (ROD, "b: [joint]", "parent", ["world", "r_palm", "r_palm"]),  # a loop is cut
+]
 
 
-def test_a_loop_is_refused_and_can_be_cut(load: Load) -> None:
-    parts = PALM, FINGER, link("rod"), SLIDE, joint("a", "rod"), joint("b", "rod", parent="finger")
-    assert "leave_out: {b: [joint]}" in refusal(load, *parts)
-    scene = load(*parts, more="leave_out: {b: [joint]}")
-    assert [body.parent for body in scene.bodies] == ["world", "r_palm", "r_palm"]
-    scene = load(*parts, more="leave_out: {a: [joint]}")
-    assert [body.parent for body in scene.bodies] == ["world", "r_palm", "r_finger"]
-
-
-@pytest.mark.parametrize("field", ["damping", "friction"])
-@pytest.mark.parametrize("kind", ["planar", "floating"])
-def test_damping_and_friction_of_planar_and_floating_joints_are_refused(
-    load: Load, kind: str, field: str
+@pytest.mark.parametrize(("elements", "left", "field", "expected"), LEFT_OUT)
+def test_what_cannot_be_simulated_is_refused_and_can_be_left_out(
+    load: Load, elements: tuple[str, ...], left: str, field: str, expected: list[str | None]
 ) -> None:
-    move = joint("move", "finger", kind, f'<dynamics {field}="1"/>')
-    assert "leave_out: {move: [dynamics]}" in refusal(load, PALM, FINGER, move)
+    option = f"leave_out: {{{left}}}"
+    assert option in refusal(load, *elements)
+    assert [getattr(body, field) for body in load(*elements, more=option).bodies] == expected
+
+
+def test_a_loop_can_be_cut_at_any_of_its_joints(load: Load) -> None:
+    scene = load(*ROD, more="leave_out: {a: [joint]}")
+    assert [body.parent for body in scene.bodies] == ["world", "r_palm", "r_finger"]
 
 
 # a refused robot makes no second mistake
