@@ -14,12 +14,14 @@ from ruamel.yaml import YAML
 from iapb.contact import finding
 from iapb.contact.finding import ContactFinder
 from iapb.contact.kernels import broadphase
+from iapb.scene import scene_from_text
 from iapb.scene.reading import scene_from_values
 from iapb.simulation import simulate
 from iapb.system import System
 from reports.store.keys import content_hash
 from tests.iapb.contact.convex import convex, directions, separations
 from tests.iapb.contact.paper import scene_of
+from verification.cost.steps import field_of_discs
 
 Values = dict[str, Any]
 
@@ -234,24 +236,10 @@ def test_every_side_of_a_box_that_a_ball_can_touch_has_a_name_of_its_own(space: 
 def test_many_shapes_are_found_without_asking_all_pairs(forces: str, monkeypatch: Any) -> None:
     """Forty discs in a grid that flies apart, the first one held, and a wall: the run has the bits of
     one that tests all pairs."""
-    rng = np.random.default_rng(0)
-    bodies: list[Values] = [
-        {
-            "name": f"d{k}",
-            "joint": "planar",
-            "mass": 0.1,
-            "inertia": 2e-5,
-            "shapes": [{"kind": "circle", "radius": 0.02, "center": [0.01, 0.0]}],
-            "position": [0.045 * (k % 7), 0.045 * (k // 7), float(rng.normal())],
-            "velocity": rng.normal(size=3).tolist(),
-        }
-        for k in range(40)
-    ]
-    bodies[0] |= {"joint": "fixed", "position": [], "velocity": []}
-    contact = {"forces": forces, "restitution": 0.5}
-    wall = {"name": "wall", "kind": "half_plane", "point": [0, -0.03], "normal": [0, 1]}
-    contact |= {"stiffness": 500} if forces == "paper" else {}
-    scene = scene_of(bodies, [wall], contact=contact)
+    held = {"name": "disc_0", "joint": "fixed", "shapes": [{"kind": "circle", "radius": 0.02}]}
+    contact = {"forces": forces} | ({"stiffness": 500} if forces == "paper" else {})
+    values = {"duration": 0.2, "bodies.0": held, "contact": contact}
+    scene = scene_from_text(field_of_discs(40)).with_values(values)
     run = simulate(scene)
     monkeypatch.setattr(broadphase, "WORTHWHILE_PAIRS", 10**9)
     alone = simulate(scene.with_values({"title": "all pairs"}))
