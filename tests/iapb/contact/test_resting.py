@@ -13,6 +13,7 @@ from iapb.run import Run
 from iapb.scene import Scene
 from iapb.simulation import simulate
 from iapb.system import System
+from tests.iapb.contact import paper
 from tests.iapb.contact.paper import scene_of
 
 FLOOR = {"name": "floor", "kind": "half_plane", "point": [0, 0], "normal": [0, 1]}
@@ -140,19 +141,15 @@ def test_implicit_forces_solve_the_complementarity_problem(seed: int) -> None:
         },
     )
     run = simulate(scene, Penalty())
-    m = System(scene).mechanism
+    system = System(scene)
     h = 1e-3
     K = scene.contact.stiffness
-    c = run.contacts
     k = K * h + scene.contact.damping
     some = 0
-    for i in range(*c.offsets[:2]):
-        J = m.point_jacobian(run.q[0], int(c.body_a[i]), c.point[i])
-        J = J - m.point_jacobian(run.q[0], int(c.body_b[i]), c.point[i]) if c.body_b[i] >= 0 else J
-        row = c.normal[i] @ J
-        p = c.normal_force[i]
-        size = np.abs(row) @ np.abs(run.v[1]) + K * abs(c.gap[i]) / k
-        opened = row @ run.v[1] + (p + K * c.gap[i]) / k
+    for c, p in zip(paper.contacts_of(system, run.q[0]), run.contacts.normal_force, strict=False):
+        row = c.normal @ paper.relative_jacobian(system.mechanism, run.q[0], c)
+        size = np.abs(row) @ np.abs(run.v[1]) + K * abs(c.gap) / k
+        opened = row @ run.v[1] + (p + K * c.gap) / k
         assert p >= 0.0 and opened >= -1e-7 * size
         assert p == 0.0 or opened <= 1e-7 * size
         some += p > 0.0
