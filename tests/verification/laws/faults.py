@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 
 from reference.complementarity import ImpactProblem, solve
+from reference.complementarity.laws import poisson as poisson_of
 from reference.exact import exact_impact
 from verification.impacts import Floats
-from verification.laws.resolver import Resolver, least_push, sound_resolver, whitened
+from verification.laws.resolver import Resolver, sound_resolver
 
 TOO_MUCH = Fraction(10001, 10000)  # factor on the impulse that e requires
 Impulses = tuple[Floats, Floats]
@@ -41,20 +42,16 @@ def makes_stale_jacobian() -> Resolver:
 
 
 # Contacts that only push.
-@whitened
-def _pushing(A: Floats, u: Floats, factor: float) -> Floats:
-    return u + factor * (A.T @ least_push(A, -u))
-
-
 def newton(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Newton's law 0 ≤ p ⟂ γ⁺ + e γ⁻ ≥ 0 (Moreau 1988), where p/(1 + e) = q minimizes |u + Aᵀq|."""
-    return _pushing(M, J, v, 1.0 + e)
+    """Newton's law 0 ≤ p ⟂ γ⁺ + e γ⁻ ≥ 0 (Moreau 1988), by active sets."""
+    problem = ImpactProblem.from_impact(M, J, v, e)
+    return solve(problem, "daqp").velocity_plus if len(J) else v
 
 
 def poisson(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
     """Poisson's law 0 ≤ p_c ⟂ γ_c ≥ 0, then 0 ≤ p − (1 + e) p_c ⟂ γ⁺ ≥ 0 (Anitescu and Potra
     1997)."""
-    return _pushing(M, J, newton(M, J, v, e), 1.0)
+    return poisson_of(ImpactProblem.from_impact(M, J, v, e)).velocity if len(J) else v
 
 
 def _adhesive(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
@@ -150,7 +147,7 @@ def _makes_stale_friction() -> Callable[..., Floats]:
 PUSHING: dict[tuple[str, str], tuple[str, Callable[..., Any]]] = {
     ("unilateral", "wrong sign"): (
         "kinetic_energy",
-        lambda M, J, v, e: _pushing(M, J, v, -(1.0 + e)),
+        lambda M, J, v, e: 2.0 * v - newton(M, J, v, e),
     ),
     ("unilateral", "pulls"): ("pushing", sound_resolver),
     ("unilateral", "adhesive"): ("separating", _adhesive),

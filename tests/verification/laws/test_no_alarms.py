@@ -39,8 +39,8 @@ def exact(M: Any, J: Any, v: Any, e: Any) -> Any:
     return np.array(exact_impact(0.5 * (M + M.T), J, v, e).velocity, float)
 
 
-def by(solver: str, M: Any, J: Any, v: Any, e: Any) -> Any:
-    return solve(ImpactProblem.from_impact(M, J, v, e), solver).velocity_plus if len(J) else v
+def lemke(M: Any, J: Any, v: Any, e: Any) -> Any:
+    return solve(ImpactProblem.from_impact(M, J, v, e), "lemke").velocity_plus if len(J) else v
 
 
 SOUND: dict[str, tuple[str, Callable[..., Any]]] = {
@@ -52,8 +52,7 @@ SOUND: dict[str, tuple[str, Callable[..., Any]]] = {
     "moreau": ("frictional", moreau),
     "iapb poisson": ("unilateral", partial(resolve_impact, method="poisson")),
     "exact": ("equality", exact),
-    "daqp": ("unilateral", partial(by, "daqp")),
-    "lemke": ("unilateral", partial(by, "lemke")),
+    "lemke": ("unilateral", lemke),
 }
 
 
