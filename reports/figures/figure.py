@@ -32,6 +32,12 @@ class Panel:
     wide: bool = False  # take the whole width of the page
 
 
+def diagram(name: str, alt: str, label: str = "") -> Panel:
+    """Return a diagram of the folder drawings/, which was drawn once."""
+    svg = files(__package__).joinpath("drawings", f"{name}.svg").read_text("utf-8")
+    return Panel(svg, alt, label)
+
+
 @dataclass(frozen=True)
 class Drawn:
     """The result of a recipe's function.

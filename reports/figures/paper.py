@@ -8,13 +8,12 @@ paper does not state the mass distribution, so Figure 3 has two.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
 
 from iapb import resolve_impact
-from reports.figures.figure import Drawn, Panel, recipe
+from reports.figures.figure import Drawn, Panel, diagram, recipe
 from reports.figures.numbers import MINUS
 from reports.figures.plot import Plot, note
 from reports.figures.style import BOUND, STYLES, line_arguments
@@ -22,22 +21,16 @@ from verification.impacts import Floats
 from verification.table import titled
 
 
-def _diagram(name: str, alt: str, label: str = "") -> Panel:
-    """Return a diagram that no number changes."""
-    svg = files(__package__).joinpath("drawings", f"{name}.svg").read_text("utf-8")
-    return Panel(svg, alt, label)
-
-
 @recipe("impact-and-step")
 def impact_and_step() -> Drawn:
     """Show the velocity before and after one impact, and the loop of a step."""
-    impact = _diagram(
+    impact = diagram(
         "impact",
         "An arrow v⁻, its part P v⁻ along the contact, and the velocity after the impact, which "
         "is no longer than v⁻.",
         "one impact, e = 0.5",
     )
-    step = _diagram(
+    step = diagram(
         "step",
         "Find contacts; new ones get an impulse, lasting ones a spring; add the hand's force; "
         "move; again.",
@@ -50,12 +43,12 @@ def impact_and_step() -> Drawn:
 def contact_forces() -> Drawn:
     """Show the hardest collision and the last resting instant of a run of the scene
     arm_pushing."""
-    colliding = _diagram(
+    colliding = diagram(
         "group_colliding",
         "The block at the wall and the arm behind it; an impulse acts at each of three contacts.",
         "(a) colliding: impulses",
     )
-    resting = _diagram(
+    resting = diagram(
         "group_resting",
         "The same, later: a spring's force acts at each contact, and the hand pushes.",
         "(b) resting: forces",
@@ -67,7 +60,7 @@ def contact_forces() -> Drawn:
 def arm() -> Drawn:
     """Show the arm, and where it is struck."""
     alt = "Two links in a straight line from a fixed pivot, struck at A or at B of the second link."
-    return Drawn([_diagram("arm", alt)])
+    return Drawn([diagram("arm", alt)])
 
 
 LENGTH = 1.0  # of both links [m]
@@ -194,20 +187,20 @@ def peg_corner(scene: Mapping[str, Any]) -> Drawn:
         (quantity, ", ".join(f"{value:g}" for value in values).replace("-", MINUS), by)
         for quantity, values, by in given
     )
-    return Drawn([_diagram("peg", alt)], titled(("quantity", "value", "given by"), rows))
+    return Drawn([diagram("peg", alt)], titled(("quantity", "value", "given by"), rows))
 
 
 @recipe("fig05", "scene/peg_corner")
 def couplings(scene: Mapping[str, Any]) -> Drawn:
     """Show both diagrams; the table repeats the scene's gains."""
     panels = (
-        _diagram(
+        diagram(
             "unilateral",
             "The hand pushes the device only; a spring and damper joins device and tool while the "
             "tool is in contact.",
             "(a) unilateral coupler: CBuc",
         ),
-        _diagram(
+        diagram(
             "four_channel",
             "The hand pushes device and tool alike; the environment force of the tool goes to the "
             "device; a spring and damper joins device and tool.",

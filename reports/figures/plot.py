@@ -9,11 +9,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-import numpy as np
-
 from reports.figures.numbers import power_of_ten
 from reports.figures.style import (
-    FORCE,
     PANEL,
     VARIABLES,
     LineStyle,
@@ -32,7 +29,6 @@ class Plot:
     ----------
     key : key of the panel, unique in the page; the identifiers of its SVG contain it
     size : width and height [inches]
-    bare : whether to hide the axes: a canvas for shapes, by default as large as the drawing
     shape : rows and columns of axes, placed by the layout
 
     Attributes
@@ -46,12 +42,10 @@ class Plot:
         key: str,
         size: tuple[float, float] = PANEL,
         *,
-        bare: bool = False,
         shape: tuple[int, int] = (1, 1),
     ) -> None:
         self.key = key
         self.size = size
-        self.bare = bare
         self.shape = shape
         self.svg = ""
         self.drawing: Any
@@ -63,14 +57,8 @@ class Plot:
 
         self._style = matplotlib.rc_context(fname=_STYLE)
         self._style.__enter__()
-        self.drawing = Figure(
-            figsize=self.size, dpi=72, layout=None if self.bare else "constrained"
-        )
-        if self.bare:
-            self.each = [self.drawing.add_axes((0.0, 0.0, 1.0, 1.0))]
-            self.each[0].set_axis_off()
-        else:
-            self.each = list(self.drawing.subplots(*self.shape, squeeze=False).ravel())
+        self.drawing = Figure(figsize=self.size, dpi=72, layout="constrained")
+        self.each = list(self.drawing.subplots(*self.shape, squeeze=False).ravel())
         self.axes = self.each[0]
         return self
 
@@ -114,26 +102,6 @@ class Plot:
         low, high = sorted(getattr(self.axes, f"get_{axis}lim")())
         shown = [value for value in values if low <= value <= high]
         getattr(self.axes, f"set_{axis}ticks")(shown, [f"{value:g}" for value in shown])
-
-
-def arrow(
-    axes: Any, tail: Any, vector: Any, *, color: str = FORCE, width: float = 1.6, head: float = 9.0
-) -> None:
-    """Draw an arrow from `tail` along `vector`."""
-    axes.annotate(
-        "",
-        xy=tuple(np.add(tail, vector)),
-        xytext=tuple(tail),
-        zorder=6,
-        arrowprops={
-            "arrowstyle": "-|>",
-            "color": color,
-            "linewidth": width,
-            "mutation_scale": head,
-            "shrinkA": 0,
-            "shrinkB": 0,
-        },
-    )
 
 
 def note(

@@ -10,10 +10,13 @@ import pytest
 from reports.figures import RECIPES
 from reports.figures.condition_map import condition_map
 from reports.figures.figure import draw
+from reports.figures.numbers import format_number
 from reports.figures.paper import arm_energies
 from reports.figures.plot import Plot
 from reports.figures.style import OUTCOMES, STYLES, VARIABLES
 from tests.reports.made_up import figure_inputs
+from verification.check import Study
+from verification.complementarity.landings import LANDINGS
 from verification.table import titled
 
 
@@ -55,6 +58,15 @@ def test_a_drawing_is_whole_asks_for_nothing_and_takes_the_colours_of_the_page(k
         assert "<style" not in panel.svg and panel.alt and not re.search(r"\bnan\b", panel.svg)
     said = "".join((figure.caption, *figure.said))
     assert len(said) > 80 and "{" not in said
+
+
+def test_the_landings_are_drawn_with_their_impulses(gallery):
+    rows = LANDINGS.table(Study()).records()
+    for row, panel in zip(rows[:2], gallery["condition"].panels[:2], strict=True):
+        for side in ("left", "right"):
+            impulse = row[f"impulse at the {side}"]
+            words = f"{'pushes' if impulse > 0 else 'pulls'} {format_number(abs(impulse), 2)}"
+            assert f">{words}<" in panel.svg
 
 
 def test_figure_3_has_the_energies_that_follow_from_the_geometry():
