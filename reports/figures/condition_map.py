@@ -2,95 +2,101 @@
 without a recipe).
 
 A filled dot means that the claim holds, a cross that it fails, a ring that the trial cannot tell.
-If several trials share a place, the size of the dot is the share of trials in which the claim
+If several trials share a place, the area of the dot is the share of trials in which the claim
 holds.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
 from reports.figures.figure import Figure, Panel
 from reports.figures.plot import Plot
 from reports.figures.style import OUTCOMES
+from verification.impacts import Floats
 from verification.table import Table
 
 _SIZE = (4.1, 2.4)  # inches
 _MOST = 24  # values of an axis of ranks
-_DOT = 6.8  # diameter of a full dot [points]
-_SHOWN = {
-    "rad": ("°", 180.0 / np.pi),
-    "m": ("mm", 1e3),
-}  # unit of a column -> unit on an axis, and the factor
+# diameters of marks [points]
+_DOT = 6.8
+_CROSS = 6.0
+_RING = 5.0
+# unit of a column -> unit on an axis, and the factor
+_SHOWN = {"rad": ("°", 180.0 / np.pi), "m": ("mm", 1e3)}
+
+
+class Axis(NamedTuple):
+    """A condition along an axis: the place of each trial, and the texts at the ticks.
+
+    If there are few values, a place is the rank of its value, so that close values are drawn apart;
+    else there are no ticks of ours.
+    """
+
+    title: str
+    places: Floats
+    ticks: list[str]
 
 
 def condition_map(
-    name: str,
-    title: str,
-    caption: str,
-    table: Table,
-    x: str,
-    y: str,
-    *split: str,
+    name: str, title: str, caption: str, table: Table, x: str, y: str, split: str
 ) -> Figure:
-    """Draw the outcomes over the columns x and y, in one panel for every combination of the columns
-    in `split`.
+    """Draw the outcomes over the columns x and y, in one panel for every value of `split`."""
+    axes = (_axis(table, x), _axis(table, y))
+    held = np.array([np.nan if one is None else float(one) for one in table.holds])
+    given = np.array(table.column(split))
+    panels: list[Panel] = []
+    for value in dict.fromkeys(given.tolist()):
+        here = given == value
+        places = np.column_stack([axis.places[here] for axis in axes])
+        label = value if isinstance(value, str) else f"{_titled(table, split)[0]}: {value:.3g}"
+        panels.append(_panel(f"{name}-{len(panels)}", label, axes, places, held[here]))
+    return Figure(name, "", title, caption, tuple(panels), None, tuple(OUTCOMES.items()))
 
-    An axis of few values shows their ranks, with a tick for each value, so that close values are
-    drawn apart.
-    """
-    units = {column.key: _SHOWN.get(column.unit, (column.unit, 1.0)) for column in table.columns}
-    titles = {key: f"{key} [{unit}]" if unit else key for key, (unit, _) in units.items()}
-    ranks = {key: sorted(set(table.column(key))) for key in (x, y)}
-    drawn = []
-    panels: dict[str, dict[tuple[float, float], list[bool | None]]] = {}
-    for row, held in zip(table.records(), table.holds, strict=True):
-        panel = ", ".join(
-            row[key]
-            if isinstance(row[key], str)
-            else f"{titles[key]}: {units[key][1] * row[key]:.3g}"
-            for key in split
-        )
-        at = {
-            key: units[key][1] * row[key]
-            if len(ranks[key]) > _MOST
-            else float(ranks[key].index(row[key]))
-            for key in (x, y)
-        }
-        panels.setdefault(panel, {}).setdefault((at[x], at[y]), []).append(held)
-    for number, (panel, places) in enumerate(panels.items()):
-        marks: dict[tuple[str, float], list[tuple[float, float]]] = {}  # outcome and size -> places
-        for place, trials in places.items():
-            decided = [held for held in trials if held is not None]
-            share = float(np.mean(decided)) if decided else 0.0
-            if share < 1.0:
-                marks.setdefault(("fails", 6.0) if decided else ("cannot tell", 5.0), []).append(
-                    place
-                )
-            if share > 0.0:
-                marks.setdefault(("holds", _DOT * share**0.5), []).append(place)
-        with Plot(f"{name}-{number}", _SIZE) as plot:
-            for (outcome, size), found in marks.items():
-                plot.marks(
-                    found, OUTCOMES[outcome], markersize=size, zorder=4 if outcome == "fails" else 3
-                )
-            plot.axes.margins(0.08)
-            plot.axes.set(xlabel=titles[x], ylabel=titles[y])
-            for axis, key, turn in (("x", x, 90), ("y", y, 0)):
-                shown = [units[key][1] * value for value in ranks[key]]
-                if len(shown) <= _MOST:
-                    named = [f"{float(f'{value:.{2 + (value >= 100)}g}'):.7g}" for value in shown]
-                    plot.axes.set(**{f"{axis}lim": (-0.6, len(shown) - 0.4)})
-                    getattr(plot.axes, f"{axis}axis").set_ticks(
-                        range(len(shown)), named, rotation=turn
-                    )
-        outcomes = [held for trials in places.values() for held in trials]
-        told = (
-            f"Map over {titles[x]} and {titles[y]}: the claim holds in {outcomes.count(True)} of "
-            f"{len(outcomes)} trials, fails in {outcomes.count(False)}."
-        )
-        drawn.append(Panel(plot.svg, told, panel))
-    legend = tuple(OUTCOMES.items())
-    return Figure(
-        name, "", title, caption, tuple(drawn), None, legend if None in table.holds else legend[:2]
+
+def _titled(table: Table, key: str) -> tuple[str, float]:
+    """Return the title of a column with the unit that is shown, and the factor to it."""
+    unit = table.columns[table.keys.index(key)].unit
+    shown, factor = _SHOWN.get(unit, (unit, 1.0))
+    return f"{key} [{shown}]" if shown else key, factor
+
+
+def _axis(table: Table, key: str) -> Axis:
+    title, factor = _titled(table, key)
+    values = factor * np.array(table.column(key))
+    different, ranks = np.unique(values, return_inverse=True)
+    if len(different) > _MOST:
+        return Axis(title, values, [])
+    return Axis(title, ranks.astype(float), [f"{value:.3g}" for value in different])
+
+
+def _panel(key: str, label: str, axes: tuple[Axis, Axis], trials: Floats, held: Floats) -> Panel:
+    """Draw the outcomes `held` (NaN: cannot tell) of the trials at their places (n, 2)."""
+    places, place_of = np.unique(trials, axis=0, return_inverse=True)
+    shares = np.full(len(places), np.nan)  # of decided trials in which the claim holds
+    for place in set(place_of[~np.isnan(held)]):
+        shares[place] = np.nanmean(held[place_of == place])
+    sizes = {
+        "holds": _DOT * np.sqrt(np.nan_to_num(shares)),
+        "fails": _CROSS * (shares < 1.0),
+        "cannot tell": _RING * np.isnan(shares),
+    }
+    with Plot(key, _SIZE) as plot:
+        for outcome, diameters in sizes.items():
+            for size in np.unique(diameters[diameters > 0.0]):
+                marked = places[diameters == size].tolist()
+                plot.marks(marked, OUTCOMES[outcome], markersize=size)
+        plot.axes.margins(0.08)
+        plot.axes.set(xlabel=axes[0].title, ylabel=axes[1].title)
+        for name, turn, axis in (("x", 90, axes[0]), ("y", 0, axes[1])):
+            if axis.ticks:
+                plot.axes.set(**{f"{name}lim": (-0.6, len(axis.ticks) - 0.4)})
+                drawn = getattr(plot.axes, f"{name}axis")
+                drawn.set_ticks(range(len(axis.ticks)), axis.ticks, rotation=turn)
+    told = (
+        f"Map over {axes[0].title} and {axes[1].title}: the claim holds in {np.sum(held == 1.0)} "
+        f"of {len(held)} trials, fails in {np.sum(held == 0.0)}."
     )
+    return Panel(plot.svg, told, label)

@@ -87,8 +87,9 @@ def test_figure_3_has_the_energies_that_follow_from_the_geometry():
 def test_a_map_counts_what_holds_and_keeps_the_numbers_of_its_axes(monkeypatch):
     marks = []
     monkeypatch.setattr(Plot, "marks", lambda plot, found, look, **how: marks.append((look, found)))
-    table = replace(titled(("x", "y"), [(0, 0), (1e-3, 0), (1e-3, 0)]), holds=(True, False, True))
-    panel = condition_map("m", "t", "c", table, "x", "y").panels[0]
+    rows = [(0, 0, "a"), (1e-3, 0, "a"), (1e-3, 0, "a")]
+    table = replace(titled(("x", "y", "part"), rows), holds=(True, False, True))
+    panel = condition_map("m", "t", "c", table, "x", "y", "part").panels[0]
     assert "2 of 3" in panel.alt and "0.001" in re.findall(r">([\d.]+)</text>", panel.svg)
     crossed = [found for look, found in marks if look == OUTCOMES["fails"]]
-    assert crossed == [[(1.0, 0.0)]] and len(marks) == 3  # a full dot, a smaller one
+    assert crossed == [[[1.0, 0.0]]] and len(marks) == 3  # a full dot, a smaller one
