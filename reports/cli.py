@@ -38,7 +38,7 @@ COMMANDS = {
     "port": "Search the motion of a hand that draws energy from a force law; draw the map of devices.",
     "compare": "Compare worlds on SCENE: distances, energy, time, and IAPB's impacts with the LCP's.",
     "solvers": "Put problem files to every complementarity solver; or compare IAPB with complementarity.",
-    "bench": "Time a step, an impact and a motion; compare with MuJoCo, Pinocchio, solvers and the printed formula.",
+    "bench": "Name the method that solves most of nine hard impacts of a size within a time, measured now.",
     "sweep": "Simulate every point of STUDY that has no run file yet, and write a table of all points.",
     "store": "Check the run and table files below a folder, or simulate its runs again.",
     "reproduce": "Regenerate the report; cached results are reused.",

@@ -13,6 +13,10 @@ from reports.evidence.runs import CORNER_SCENE, FIGURE_RUNS, TILTED, corner_scen
 from reports.figures.corner import UNLIMITED
 from reports.figures.paper import arm_energies
 from reports.numbers_file import read_numbers
+from reports.pages.records import Evidence
+from reports.uses import StoredFile
+from verification.finding import MIXED, REFUTED, REPRODUCED, Part, finding_of
+from verification.table import titled
 
 NAMES = ("peg.x", "peg.y", "peg.theta")
 TEXTS = {
@@ -112,3 +116,59 @@ def figure_inputs():
     tilted = {TILTED: dict.fromkeys((0.0, 0.015, 0.2), worlds)}
     scene = {CORNER_SCENE: corner_scene(), "arm_energies": arm_energies()}
     return {**tables, **runs, **tilted, **scene}
+
+
+RUNS = tuple(
+    StoredFile(f"{n}.h5", f"{n:064d}", f"iapb run peg_corner --set rate={n}", ("C10",))
+    for n in range(3)
+)
+
+
+def one(key, *parts, **more):
+    return finding_of(key, key, "q", parts, answer="a", **more)
+
+
+EVIDENCE = Evidence(
+    claims=(
+        finding_of(
+            "C01",
+            "C01",
+            "KE never rises <b>",
+            (Part("as printed.", MIXED, "as printed"),),
+            {"C01": titled(("κ", "gain"), ((1e3, 2e-16),))},
+            answer="half of the printed loss: $\\frac{1}{2}$",
+        ),
+        one("C02", Part("n.", REFUTED)),
+        one("C10", Part("p.", REPRODUCED)),
+    ),
+    topics=(
+        finding_of(
+            "stability",
+            "Walls",
+            "Asked <here>.",
+            (Part("It holds to 1e-14.", REPRODUCED),),
+            {"wide": titled([f"a long heading {k}" for k in range(12)], [("word", *range(11))])},
+            answer="All hold.",
+        ),
+    ),
+    effects={
+        "peg": titled(
+            (
+                "effect",
+                "active",
+                "reason",
+                "left out",
+                "without it",
+                "position [mm]",
+                "energy [%]",
+            ),
+            [
+                ("gravity", False, "none in the scene", "", None, None, None),
+                ("friction", True, "a coefficient", "", "another motion", 2.5, 10.0),
+                ("touch", True, "walls", "", "same bits", 0.0, 0.0),
+            ],
+        )
+    },
+    provenance={"commit": "abc"},
+    runs=RUNS,
+)

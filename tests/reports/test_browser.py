@@ -7,17 +7,15 @@ Without a browser the tests are skipped, and say so.
 
 import shutil
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from reports.figures import RECIPES
 from reports.pages.builder import build_report, draw_all
-from reports.pages.records import Evidence
 from reports.report import write_report
-from tests.reports.made_up import figure_inputs
-from verification.finding import MIXED, REPRODUCED, Part, finding_of
-from verification.table import titled
+from tests.reports.made_up import EVIDENCE, figure_inputs
 
 pytestmark = pytest.mark.thorough
 
@@ -83,31 +81,8 @@ PALE = """(least) => {
 
 @pytest.fixture(scope="module")
 def evidence():
-    """Made-up records: a little of each kind, wide tables and long words among them."""
-    table = titled(tuple(f"a long heading {k}" for k in range(12)), (("word", *range(11)),))
-    return Evidence(
-        inputs=figure_inputs(),
-        claims=(
-            finding_of(
-                "C01",
-                "C01",
-                "energy never rises",
-                (Part("p.", MIXED, "as printed"),),
-                {"C01": table},
-                answer="half: $\\frac{1}{2}$",
-            ),
-        ),
-        topics=(
-            finding_of(
-                "stability",
-                "Walls",
-                "Asked.",
-                (Part("It holds.", REPRODUCED),),
-                {"wide": table},
-            ),
-        ),
-        provenance={"commit": "0123456789abcdef" * 4},
-    )
+    """Made-up records: a little of each kind, a wide table and long words among them."""
+    return replace(EVIDENCE, inputs=figure_inputs())
 
 
 @pytest.fixture(scope="module")

@@ -14,15 +14,14 @@ import pytest
 from iapb.errors import SceneError
 from reports import cli, show
 from reports.store.runs import read_run
-from verification.finding import REPRODUCED, Failure, Finding, Part, with_failures
-from verification.table import Column, Table, titled
+from verification.finding import REPRODUCED, Part
+from verification.table import titled
 
 ROOT = Path(__file__).parents[2]
 SLOPE = ROOT / "tests" / "verification" / "worlds" / "slope.yaml"
 SHORT = ("peg_corner", "--set", "duration=0.4")
 STUDY = "scene: two_discs\nvalues:\n  contact.restitution: [0.0, 0.5]\n"
 WRONG = "verification.laws.planted:wrong_sign"
-FAILED = Failure("four contacts", "SolverError", "no solution")
 WRONG_SCENE = """\
 name: wrong
 rate: -5
@@ -309,19 +308,15 @@ def test_certify_judges_runs_and_archives_and_exports_them_as_integers(iapb, ans
     assert Path("impacts.txt").read_text(encoding="utf-8").splitlines() == whole
 
 
-def test_bench_names_a_method_for_a_budget_and_prints_its_tables(answer, monkeypatch):
-    tables = {"one": Table((Column("x"),), ((1,),))}
-    finding = Finding("cost", "t", "q", "a", REPRODUCED, (Part("s", REPRODUCED),), tables)
-    for name, stand_in in (
-        ("haptic_study", lambda *_: with_failures(finding, [FAILED])),
-        ("recommended", lambda _: Table(())),
-        ("work_precision", lambda **_: Table((Column("y"),), ((2,),))),
-    ):
-        monkeypatch.setattr(f"reports.commands.bench.{name}", stand_in)
-    status, found = answer("bench")
-    assert status == 1 and set(found) == listed("bench")
-    tables = found["tables"]
-    assert (tables["one"], tables["methods on problems"]) == ([{"x": 1}], [{"y": 2}])
+def test_bench_names_the_methods_for_a_budget_or_says_that_there_is_none(iapb, answer, monkeypatch):
+    found = ["IAPB in 1 µs"]
+    monkeypatch.setattr("reports.commands.bench.which_method", lambda *_: found)
+    bench = ("bench", "--budget", "2ms", "--contacts", "7")
+    status, given = answer(*bench)
+    assert (status, set(given), given["choices"]) == (0, listed("bench --budget"), found)
+    assert found[0] in iapb(*bench)[1]
+    found.clear()
+    assert "In 2 ms no method solves 7 contacts on 6 coordinates" in iapb(*bench)[1]
 
 
 def test_compare_puts_worlds_on_one_page_and_stores_them_with_their_figure(iapb, here):
