@@ -56,6 +56,12 @@ def test_a_rebound_too_weak_and_one_too_strong_are_the_same_residual() -> None:
     ]
 
 
+def test_restitution_is_judged_to_rounding_where_rows_are_independent() -> None:
+    case = ImpactCase(np.eye(2), np.eye(2), np.array([-1.0, -2.0]), 0.5)
+    residual = LAWS["restitution"].check(case, lambda M, J, v, e: -e * v * (1.0 + 1e-9), KIT)
+    assert residual is not None and not residual.passed
+
+
 def test_momentum_that_appears_is_found_though_it_is_the_same_in_every_frame() -> None:
     case = ImpactCase(
         np.eye(2), np.array([[1.0, -1.0]]), np.array([-1.0, 1.0]), 0.5, translations=np.ones((1, 2))
