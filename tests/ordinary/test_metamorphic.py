@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import copy
 import json
-import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -250,7 +249,6 @@ CHANGES: dict[str, tuple[Callable[[Values], Values], Place, float]] = {
     "each wall twice": (twice, SAME, 1e-4),
     "a light body far away": (beside(1e-3), SAME, 0.0),
     "a heavy body far away": (beside(1e6), SAME, 0.0),
-    "turned by a right angle": (as_it_is, Place(angle=math.pi / 2.0), 1e-6),
     "turned by 0.7": (as_it_is, Place(angle=0.7), 1e-6),
     "mirrored": (as_it_is, Place(mirrored=True), 1e-6),
     "a kilometre away": (as_it_is, Place(shift=(1000.0, 1000.0, 0.0)), 1e-4),
