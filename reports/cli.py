@@ -19,38 +19,44 @@ import typer
 
 from iapb.errors import ArgumentError, IapbError, RunFileError, harmless, name_the_extra
 
-# command -> its line in `iapb --help`. The module of that name in reports.commands, with _ for -,
-# has a function with the same name. Only the module of the given command is imported; `iapb --help` imports none.
-COMMANDS = {
-    "run": "Simulate SCENE and store the run as HDF5. An existing run is reused.",
-    "check": "Warn of problems that would make a run of SCENE worthless, with values to set; end with 3 then.",
-    "scenes": "List the scenes that come with the project: their names, and what they show.",
-    "view": "Show SCENE in real time in a browser, with the mouse as the hand, and store the run.",
-    "effects": "List every effect of SCENE: on or off, the reason, and what leaving it out would change.",
-    "inspect": "Describe a run: scene, law, collisions, energy, effects, provenance and hashes.",
-    "certify": "Judge every recorded impact exactly: energy gain, and whether impulses and velocities are consistent.",
-    "schema": "Print the JSON Schema of scene files (for completion and checks in an editor).",
-    "prove": "Check every machine-checked statement, or print the proof of one.",
-    "verify": "Test an impact resolver against every law; print the verdict, the worst case and a shrunk "
-    "counterexample.",
-    "verify-many": "Test the laws on a million impacts and thousands of trajectories; Ctrl-C lists what was found.",
-    "verify-world": "Put a world to the laws of trajectories on random scenes.",
-    "port": "Search the motion of a hand that draws energy from a force law; draw the map of devices.",
-    "compare": "Compare worlds on SCENE: distances, energy, time, and IAPB's impacts with the LCP's.",
-    "solvers": "Put problem files to every complementarity solver; or compare IAPB with complementarity.",
-    "bench": "Name the method that solves most of nine hard impacts of a size within a time, measured now.",
-    "sweep": "Simulate every point of STUDY that has no run file yet, and write a table of all points.",
-    "store": "Check the run and table files below a folder, or simulate its runs again.",
-    "reproduce": "Regenerate the report; cached results are reused.",
-    "report": "Compare the numbers of two reports: equal, within a tolerance, or different; end with 1 if some differ.",
+# heading in `iapb --help` -> command -> its line there. The module of that name in reports.commands,
+# with _ for -, has a function with the same name. Only the module of the given command is imported;
+# `iapb --help` imports none.
+GROUPS: dict[str, dict[str, str]] = {
+    "Simulate": {
+        "run": "Simulate SCENE and store the run as HDF5. An existing run is reused.",
+        "check": "Warn of problems that would make a run of SCENE worthless, with values to set; end with 3 then.",
+        "scenes": "List the scenes that come with the project: their names, and what they show.",
+        "schema": "Print the JSON Schema of scene files (for completion and checks in an editor).",
+        "effects": "List every effect of SCENE: on or off, the reason, and what leaving it out would change.",
+        "view": "Show SCENE in real time in a browser, with the mouse as the hand, and store the run.",
+        "sweep": "Simulate every point of STUDY that has no run file yet, and write a table of all points.",
+    },
+    "Look at runs": {
+        "inspect": "Describe a run: scene, law, collisions, energy, effects, provenance and hashes.",
+        "certify": "Judge every recorded impact exactly: energy gain, and whether impulses and "
+        "velocities are consistent.",
+        "compare": "Compare worlds on SCENE: distances, energy, time, and IAPB's impacts with the LCP's.",
+        "store": "Check the run and table files below a folder, or simulate its runs again.",
+    },
+    "Verify": {
+        "verify": "Test an impact resolver against every law; print the verdict, the worst case "
+        "and a shrunk counterexample.",
+        "port": "Search the motion of a hand that draws energy from a force law; draw the map of devices.",
+        "verify-many": "Test the laws on a million impacts and thousands of trajectories; Ctrl-C lists "
+        "what was found.",
+        "verify-world": "Put a world to the laws of trajectories on random scenes.",
+        "solvers": "Put problem files to every complementarity solver; or compare IAPB with complementarity.",
+        "prove": "Check every machine-checked statement, or print the proof of one.",
+        "bench": "Name the method that solves most of nine hard impacts of a size within a time, measured now.",
+    },
+    "The paper": {
+        "reproduce": "Regenerate the report; cached results are reused.",
+        "report": "Compare the numbers of two reports: equal, within a tolerance, or different; "
+        "end with 1 if some differ.",
+    },
 }
-
-GROUPS = {  # of the help, in its order
-    "Simulate": ("run", "check", "scenes", "schema", "effects", "view", "sweep"),
-    "Look at runs": ("inspect", "certify", "compare", "store"),
-    "Verify": ("verify", "port", "verify-many", "verify-world", "solvers", "prove", "bench"),
-    "The paper": ("reproduce", "report"),
-}
+COMMANDS = [name for commands in GROUPS.values() for name in commands]
 
 COMPLETION = "_IAPB_COMPLETE"  # set while a shell asks for completions
 STOPPED = "stopped; files that were complete stay"
@@ -85,17 +91,22 @@ def _app(given: list[str]) -> typer.Typer:
     if COMPLETION in os.environ:  # shell completion: the shell passes the words in a variable
         given = os.environ.get("COMP_WORDS", os.environ.get("_TYPER_COMPLETE_ARGS", "")).split()[1:]
     wanted = next((word for word in given if not word.startswith("-")), "")
-    for name, words in COMMANDS.items():
-        group = next(title for title, names in GROUPS.items() if name in names)
-        if name == wanted:
-            file = name.replace("-", "_")
-            command = getattr(import_module(f"reports.commands.{file}"), file)
-            app.command(name, rich_help_panel=group)(_answering(command))
-        else:
-            app.command(name, help=words, rich_help_panel=group)(
-                lambda: None
-            )  # only listed in the help
+    for group, commands in GROUPS.items():
+        for name, words in commands.items():
+            if name == wanted:
+                app.command(name, rich_help_panel=group)(_answering(_command(name)))
+            else:
+                app.command(name, help=words, rich_help_panel=group)(_only_listed)
     return app
+
+
+def _command(name: str) -> Callable[..., Any]:
+    file = name.replace("-", "_")
+    return cast(Callable[..., Any], getattr(import_module(f"reports.commands.{file}"), file))
+
+
+def _only_listed() -> None:
+    """Stand for a command in the help."""
 
 
 def _answering(command: Callable[..., Any]) -> Callable[..., int]:

@@ -13,7 +13,6 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import compress
-from os.path import commonprefix
 from typing import Any
 
 from reports.numbers_file import ReportNumbers
@@ -232,16 +231,10 @@ def lines(found: Difference) -> Iterator[str]:
     """Yield a line for each of the SHOWN largest differences: table, row, column, both values,
     relative difference."""
     for cell in found.of(DIFFERS)[:SHOWN]:
-        old = str(cell.old)
-        new = str(cell.new)
-        start = 0
-        if max(len(old), len(new)) > _WIDEST:  # shortly before they differ
-            start = max(0, len(commonprefix([old, new])) - 8)
         share = f" ({cell.gap:.1e} of it)" if math.isfinite(cell.gap) else ""
         yield (
-            f"{cell.table}, row {_short(cell.row)}, {_short(cell.column)}: {_short(old[start:])} "
-            f"-> "
-            f"{_short(new[start:])}{share}"
+            f"{cell.table}, row {_short(cell.row)}, {_short(cell.column)}: "
+            f"{_short(str(cell.old))} -> {_short(str(cell.new))}{share}"
         )
 
 

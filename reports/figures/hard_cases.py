@@ -29,15 +29,11 @@ def the_failure(numbers: Table) -> Drawn:
     return Drawn([Panel(plot.svg, f"Kinetic energy over time: {title}.")], numbers)
 
 
+# column of the table -> name and look of its curve
 _RULES = {
-    "error, impacts at the touch": STYLES["IAPB"],
-    "error, impacts at the step": LineStyle(MUTED, "s", (5, 1.6)),
-    "error of MuJoCo": STYLES["MuJoCo"],
-}
-_TITLES = {
-    "error, impacts at the touch": "IAPB, impacts at the touch",
-    "error, impacts at the step": "IAPB, impacts at steps",
-    "error of MuJoCo": "MuJoCo",
+    "error, impacts at the touch": ("IAPB, impacts at the touch", STYLES["IAPB"]),
+    "error, impacts at the step": ("IAPB, impacts at steps", LineStyle(MUTED, "s", (5, 1.6))),
+    "error of MuJoCo": ("MuJoCo", STYLES["MuJoCo"]),
 }
 _FLOOR = 1e-16  # errors below are drawn here
 
@@ -46,15 +42,14 @@ _FLOOR = 1e-16  # errors below are drawn here
 def impacts_at_the_touch(numbers: Table) -> Drawn:
     """Draw the error of each motion over the step, for both rules and for MuJoCo."""
     panels = []
-    rules = [key for key in _RULES if key in numbers.keys]
+    rules = {key: rule for key, rule in _RULES.items() if key in numbers.keys}
     for motion in dict.fromkeys(numbers["motion"]):
         shown = numbers.where(motion=motion)
         with Plot(f"touch-{motion.replace(' ', '-')}", (3.1, 2.5)) as plot:
-            for key in rules:
+            for key, (_, look) in rules.items():
                 points = shown.select(("step", key)).rows
-                plot.curve([(step, max(error, _FLOOR)) for step, error in points], _RULES[key])
+                plot.curve([(step, max(error, _FLOOR)) for step, error in points], look)
             plot.log("step [ms]", "error, of its length", ylim=(1e-16, 1e2))
             plot.ticks("x", sorted(shown["step"]))
         panels.append(Panel(plot.svg, f"Error over the step: {motion}.", motion))
-    legend = {_TITLES[key]: _RULES[key] for key in rules}
-    return Drawn(panels, numbers, legend)
+    return Drawn(panels, numbers, rules.values())

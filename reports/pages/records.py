@@ -44,4 +44,3 @@ class Evidence:
     seconds: Mapping[str, float] = field(
         default_factory=dict
     )  # that each stage took to compute or read
-    figure_command: str = "iapb reproduce --figure {key}"

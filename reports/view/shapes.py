@@ -73,11 +73,9 @@ def _in_space(values: Any, z: float = 0.0) -> Floats:
 
 
 def _ball() -> Floats:
-    """Return points of the unit sphere, on circles of latitude and longitude."""
-    latitude = 0.5 * _TURN[:25, None]
-    rings = [np.sin(latitude) * _CIRCLE[::2][:, k] for k in (0, 1)]
-    height = np.broadcast_to(np.cos(latitude), rings[0].shape)
-    return np.stack([*rings, height], axis=-1).reshape(-1, 3)
+    """Return points of the unit sphere: a circle in the plane, turned about the x axis."""
+    ring = np.pad(_CIRCLE, ((0, 0), (0, 1)))
+    return np.vstack([turn.apply(ring) for turn in Rotation.from_euler("x", _TURN[:24:2])])
 
 
 def _slab(wall: Shape, size: list[float]) -> Floats:
