@@ -15,7 +15,6 @@ from reports.difference import (
     DIFFERS,
     PARTS,
     SHOWN,
-    Difference,
     compare_reports,
     parts,
     sentences,
@@ -25,6 +24,8 @@ from reports.difference import lines as largest
 from reports.numbers_file import read_numbers
 from reports.show import Answer, Json
 from verification.table import Table, titled
+
+_COLUMNS = ("part", *(name for name, _ in PARTS))
 
 
 class Action(StrEnum):
@@ -71,20 +72,9 @@ def report(
         lines.append(
             f"The old report is {first.depth}, the new one {second.depth}: many numbers are of one only."
         )
-    return Answer(
-        facts, [*lines, *difference_lines(found, tolerance)], 1 if found.count(DIFFERS) else 0
-    )
-
-
-def difference_lines(found: Difference, tolerance: float) -> list[str | Table]:
-    """Return a table by part of the report, the largest differences, and a summary in sentences."""
-    by_part = titled(("part", *(name for name, _ in PARTS)), parts(found))
     count = found.count(DIFFERS)
-    listed = [f"The largest {min(count, SHOWN)} of {count} differences:"] if count else []
-    return [
-        "Table and words by part of the report",
-        by_part,
-        *listed,
-        *(f"  {line}" for line in largest(found)),
-        *sentences(found, tolerance),
-    ]
+    lines += ["Table and words by part of the report", titled(_COLUMNS, parts(found))]
+    if count:
+        lines.append(f"The largest {min(count, SHOWN)} of {count} differences:")
+        lines += [f"  {line}" for line in largest(found)]
+    return Answer(facts, [*lines, *sentences(found, tolerance)], 1 if count else 0)

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,8 +12,6 @@ import typer
 from iapb.errors import ArgumentError, counted
 from iapb.lazy import needed
 from iapb.names import nearest
-from reports.commands.report import difference_lines
-from reports.difference import DIFFERS, ONLY_OLD, TOLERANCE, compare_reports, unlike
 from reports.evidence.gather import failed_cases, gather
 from reports.evidence.runs import (
     CORNER_SCENE,
@@ -27,7 +23,6 @@ from reports.evidence.runs import (
 )
 from reports.figures import RECIPES
 from reports.figures.figure import TEXTS, draw
-from reports.numbers_file import read_numbers
 from reports.pages.builder import build_report, draw_all, figure_inputs, figure_page
 from reports.pages.first import count_claims
 from reports.pages.records import FailedCases
@@ -42,21 +37,14 @@ SHOWN_FAILURES = 20  # of a stage, in the last lines
 
 def reproduce(
     out: Annotated[
-        Path | None,
-        typer.Option(
-            help="Folder of the report, the runs and the tables; default out, with --check a temporary one."
-        ),
-    ] = None,
+        Path, typer.Option(help="Folder of the report, the runs and the tables.")
+    ] = Path("out"),
     full: Annotated[
         bool,
         typer.Option("--full", help="The deep version: finer conditions, ten times the impacts."),
     ] = False,
     figure: Annotated[
         str | None, typer.Option(help="Write one figure's drawings only (such as fig07) as SVG.")
-    ] = None,
-    check: Annotated[
-        Path | None,
-        typer.Option(help="Recompute everything and compare all numbers with this report."),
     ] = None,
     json_: Json = False,
 ) -> Answer:
@@ -67,12 +55,9 @@ def reproduce(
     ):  # if one is missing, say it before minutes of computing
         needed(package, "iapb reproduce")
     depth = "full" if full else "quick"
-    folder = out or Path("out")
-    if check is not None:
-        return check_report(check, out)
     if figure is not None:
-        return _write_figure(figure, folder, depth)
-    return make_report(folder, depth)
+        return _write_figure(figure, out, depth)
+    return make_report(out, depth)
 
 
 def make_report(out: Path, depth: str) -> Answer:
@@ -132,53 +117,6 @@ def _failure_lines(failed: Sequence[FailedCases]) -> Iterator[str]:
         if len(one.failures) > SHOWN_FAILURES:
             yield f"  {one.stage}: and {len(one.failures) - SHOWN_FAILURES} more"
         yield f"    tracebacks: {one.file}"
-
-
-def check_report(report: Path, out: Path | None) -> Answer:
-    """Compute everything again, at the report's depth, into `out` or a temporary folder, and
-    compare.
-
-    With the same code, packages, processor and BLAS kernel, runs must agree to the last bit;
-    otherwise numbers must agree within the tolerance. Ends with 1 if they do not, or if numbers of
-    the report were not computed again.
-    """
-    given = read_numbers(report)
-    if out is not None and out.exists() and any(out.iterdir()):
-        raise ArgumentError(
-            "--out", str(out), "an empty folder: results in it would be reused, not computed again"
-        )
-    with tempfile.TemporaryDirectory() if out is None else nullcontext(str(out)) as folder:
-        answer = make_report(Path(folder), given.depth)
-        if answer.status:
-            return answer
-        made = read_numbers(folder)
-    found = compare_reports(given, made)
-    reasons = unlike(given.provenance, made.provenance)
-    lost = found.count(ONLY_OLD) + len(found.tables_old)
-    failed = found.count(DIFFERS) + lost + (0 if reasons else len(found.runs_other))
-    like = (
-        f"The report was made with another {', '.join(reasons)}: numbers must agree within {TOLERANCE:.0e}."
-        if reasons
-        else "Same code, packages, processor and BLAS kernel: runs must agree to the last bit."
-    )
-    return Answer(
-        answer.facts
-        | {
-            "differs_in": reasons,
-            "tolerance": TOLERANCE,
-            "differing": found.of(DIFFERS),
-            "not_made_again": lost,
-            "runs_other": found.runs_other,
-            "made_again": not failed,
-        },
-        [
-            *answer.lines,
-            f"\n{like}",
-            *difference_lines(found, TOLERANCE),
-            f"{report}: {'not every' if failed else 'every'} number was made again.",
-        ],
-        int(bool(failed)),
-    )
 
 
 def _write_figure(key: str, out: Path, depth: str) -> Answer:

@@ -50,7 +50,6 @@ def out(tmp_path_factory):
             "reproduce",
             "--out",
             str(folder),
-            f"--check={folder}",
         ]
         patch.setattr(sys, "argv", words)
         evidence = Evidence(
@@ -108,7 +107,7 @@ def test_nothing_says_on_which_machine_it_was_made(out):
         ("/srv/data/out", "out"),
         ("../../her/out", "out"),
         ("rate=1/512", "rate=1/512"),
-        ("--check=../r.html", "--check=r.html"),
+        ("--out=../r", "--out=r"),
     ],
 )
 def test_paths_of_a_machine_are_cut_from_the_command(word, kept, monkeypatch):

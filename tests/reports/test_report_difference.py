@@ -1,7 +1,6 @@
 """Two reports compared: a planted change is found, whatever its kind; measured times are left
 alone."""
 
-import json
 import math
 from dataclasses import replace
 
@@ -20,7 +19,6 @@ from reports.difference import (
     unlike,
 )
 from reports.numbers_file import NUMBERS_NAME, ReportNumbers, read_numbers, write_numbers
-from reports.show import Answer
 from verification.table import titled
 
 TABLE = titled(
@@ -184,61 +182,3 @@ def test_a_foreign_file_is_refused_in_one_sentence(text, tmp_path, capsys):
         read_numbers(path)
     assert cli.main(["report", "diff", str(path), str(path)]) == 1
     assert capsys.readouterr().err.startswith("iapb: ")
-
-
-@pytest.fixture
-def remade(monkeypatch):
-    """Stand in for the hours of computing: `reproduce --check` makes the report that is put
-    here."""
-    made = [REPORT]
-    folders = []
-
-    def make_report(out, depth):
-        folders.append(out)
-        out.mkdir(exist_ok=True)
-        write_numbers(out / NUMBERS_NAME, replace(made[-1], depth=depth))
-        return Answer({"page": out / "report.html"}, [])
-
-    monkeypatch.setattr("reports.commands.reproduce.make_report", make_report)
-    return made, folders
-
-
-@pytest.mark.parametrize(
-    ("other", "status", "said"),
-    [
-        (REPORT, 0, "every number was made again"),
-        (changed(0, "gain", 1.5 + 1e-12), 0, "1 agree within 1e-09"),
-        (changed(0, "gain", 1.6), 1, "not every number"),
-        (replace(REPORT, tables={}), 1, "not every number"),
-        (
-            replace(REPORT, runs={"iapb run peg_corner": "d" * 64}),
-            1,
-            "runs must agree to the last bit",
-        ),
-        (
-            replace(
-                REPORT,
-                runs={"iapb run peg_corner": "d" * 64},
-                provenance={"cpu": "two", "commit": "abc"},
-            ),
-            0,
-            "made with another cpu: numbers must agree within 1e-09",
-        ),
-    ],
-)
-def test_a_report_is_checked_by_making_it_again(other, status, said, remade, tmp_path, capsys):
-    write_numbers(tmp_path / NUMBERS_NAME, REPORT)
-    remade[0].append(other)
-    assert cli.main(["reproduce", "--check", str(tmp_path / "report.html")]) == status
-    assert said in capsys.readouterr().out
-    assert not remade[1][0].exists()  # the temporary folder is gone
-    assert cli.main(["reproduce", "--check", str(tmp_path), "--json"]) == status
-    assert json.loads(capsys.readouterr().out)["made_again"] == (status == 0)
-
-
-def test_a_check_never_reads_what_is_there(remade, tmp_path, capsys):
-    write_numbers(tmp_path / NUMBERS_NAME, replace(REPORT, depth="full"))
-    assert cli.main(["reproduce", "--check", str(tmp_path), "--out", str(tmp_path)]) == 1
-    assert "an empty folder" in capsys.readouterr().err and not remade[1]
-    assert cli.main(["reproduce", "--check", str(tmp_path), "--out", str(tmp_path / "new")]) == 0
-    assert read_numbers(tmp_path / "new").depth == "full"
