@@ -75,7 +75,7 @@ def _in_space(values: Any, z: float = 0.0) -> Floats:
 def _ball() -> Floats:
     """Return points of the unit sphere: a circle in the plane, turned about the x axis."""
     ring = np.pad(_CIRCLE, ((0, 0), (0, 1)))
-    return np.vstack([turn.apply(ring) for turn in Rotation.from_euler("x", _TURN[:24:2])])
+    return np.vstack([turn.apply(ring) for turn in Rotation.from_euler("x", _TURN[:24:2, None])])
 
 
 def _slab(wall: Shape, size: list[float]) -> Floats:

@@ -107,62 +107,25 @@ def started():
         browser.close()
 
 
-class Sight:
-    """A page in a browser, and what it did that it should not: `errors` of its console, `requests`
-    beside its own."""
-
-    def __init__(self, page):
-        self.page = page
-        self.ask = page.evaluate
-        self.errors = []
-        self.requests = []
-        page.on(
-            "console",
-            lambda said: said.type in ("error", "warning") and self.errors.append(said.text),
-        )
-        page.on("pageerror", lambda error: self.errors.append(str(error)))
-
-
 @pytest.fixture(scope="module")
 def see(started, first):
-    """Return ``see(page="figures", size=DESK, **context)``: a context manager that opens a
-    section's page or a file.
-
-    Any request of it but for another page of the report is refused and remembered.
-    """
+    """Return ``see(page="figures", size=DESK, **context)``: a context manager that opens a page of
+    the report, or a file, offline, and yields it and the errors that it reports."""
 
     @contextmanager
     def opened(page="figures", size=DESK, **context):
         path = page if isinstance(page, Path) else first.parent / "report" / f"{page}.html"
-        pages = {
-            page.resolve().as_uri()
-            for page in path.parents[path.parent.name == "report"].rglob("*.html")
-        }
-        room = started.new_context(
-            viewport={"width": size[0], "height": size[1]}, offline=True, **context
-        )
-        sight = Sight(room.new_page())
-
-        def judge(route):
-            if route.request.url.split("#")[0] in pages or route.request.url.startswith("data:"):
-                route.continue_()
-            else:
-                sight.requests.append(route.request.url)
-                route.abort()
-
-        room.route("**/*", judge)
-        sight.page.goto(path.resolve().as_uri())
-        yield sight
+        view = {"width": size[0], "height": size[1]}
+        room = started.new_context(viewport=view, offline=True, **context)
+        sight = room.new_page()
+        errors = []
+        sight.on("console", lambda said: errors.append(said.text))
+        sight.on("pageerror", lambda error: errors.append(str(error)))
+        sight.goto(path.resolve().as_uri())
+        yield sight, errors
         room.close()
 
     return opened
-
-
-@pytest.fixture
-def desk(see):
-    """The page of the figures, one's own, to change."""
-    with see() as seen:
-        yield seen
 
 
 def pages_of(first):
@@ -176,39 +139,41 @@ def test_each_page_is_whole(see, first, report, size):
         pytest.skip("no out/report.html here; `make reproduce` makes one")
     figures = 0
     given = first if report == "made up" else REAL
-    with see(given, size) as sight:
+    with see(given, size) as (page, errors):
         for path in pages_of(given):
-            sight.page.goto(path.as_uri())
-            assert (sight.errors, sight.requests) == ([], [])
-            assert sight.ask(OUT_OF_SIGHT) == sight.ask(CLIPPED) == [] and sight.ask(OVERFLOW) <= 0
-            figures += sight.ask("() => document.querySelectorAll('figure').length")
+            page.goto(path.as_uri())
+            assert errors == []
+            assert page.evaluate(OUT_OF_SIGHT) == page.evaluate(CLIPPED) == []
+            assert page.evaluate(OVERFLOW) <= 0
+            figures += page.evaluate("() => document.querySelectorAll('figure').length")
         assert figures > len(FIGURES)
 
 
-def test_the_checks_see_a_page_that_is_not_whole(desk):
-    desk.ask("""() => {
-        document.querySelector("main figure svg:not(.swatch)").style.height = "0";
-        const wide = { textContent: "wide", style: "width: 3000px; max-width: none" };
-        document.querySelector("main").append(Object.assign(document.createElement("p"), wide));
-        document.querySelector("h2").style.color = "#888";
-        document.body.append(Object.assign(new Image(), { src: "https://example.org/a.png" }));
-    }""")
-    desk.page.wait_for_timeout(100)
-    assert (
-        len(desk.ask(OUT_OF_SIGHT)) == 1
-        and desk.ask(OVERFLOW) > 1000
-        and desk.ask(CLIPPED) == ["wide"]
-    )
-    assert "H2." in desk.ask(PALE, LEAST_CONTRAST)
-    assert desk.errors != []  # the page's own policy refused the picture, before any request
+def test_the_checks_see_a_page_that_is_not_whole(see):
+    with see() as (page, errors):
+        page.evaluate("""() => {
+            document.querySelector("main figure svg:not(.swatch)").style.height = "0";
+            const wide = { textContent: "wide", style: "width: 3000px; max-width: none" };
+            document.querySelector("main").append(Object.assign(document.createElement("p"), wide));
+            document.querySelector("h2").style.color = "#888";
+            document.body.append(Object.assign(new Image(), { src: "https://example.org/a.png" }));
+        }""")
+        page.wait_for_timeout(100)
+        assert (
+            len(page.evaluate(OUT_OF_SIGHT)) == 1
+            and page.evaluate(OVERFLOW) > 1000
+            and page.evaluate(CLIPPED) == ["wide"]
+        )
+        assert "H2." in page.evaluate(PALE, LEAST_CONTRAST)
+        assert errors != []  # the page's own policy refused the picture, before any request
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_all_text_can_be_read(see, first, scheme):
-    with see(color_scheme=scheme) as sight:
+    with see(color_scheme=scheme) as (page, _):
         for path in pages_of(first):
-            sight.page.goto(path.as_uri())
-            sight.ask(
+            page.goto(path.as_uri())
+            page.evaluate(
                 "() => document.querySelectorAll('details').forEach((part) => { part.open = true; })"
             )
-            assert sight.ask(PALE, LEAST_CONTRAST) == {}
+            assert page.evaluate(PALE, LEAST_CONTRAST) == {}

@@ -40,23 +40,14 @@ from verification.table import Column, Table, table_from
 ANY = (
     None,
     math.nan,
-    math.inf,
     -math.inf,
     -0.0,
-    0.1,
     5e-324,
-    3,
-    -(2**53) - 1,
     2**70,
     True,
-    False,
-    "",
     "é",
     "nan",
-    "True",
-    "None",
     np.float32(0.5),
-    np.int64(3),
     np.bool_(True),
 )
 FINDING = finding_of(
@@ -271,56 +262,32 @@ def broken(original, here):
     return call
 
 
-def of_claims(patch, folder, failures):
-    """One trial of C07, and all of C01."""
+def test_a_trial_that_raises_costs_its_row_and_a_claim_its_verdict(monkeypatch, tmp_path):
     chosen = {name: verification.claims.CLAIMS[name] for name in ("C01", "C07")}
     chosen["C01"] = replace(chosen["C01"], cases=broken(chosen["C01"].cases, lambda study: True))
-    patch.setattr(verification.claims, "CLAIMS", chosen)
-    patch.setattr(
-        arm,
-        "strike",
-        broken(
-            arm.strike,
-            lambda robot, place, angle, e: (place, angle) == (arm.PLACES[0], arm.ANGLES[0]),
-        ),
-    )
-    first, second = topics.checked_claims("claims", Runner(folder), "quick", nothing, failures)
+    monkeypatch.setattr(verification.claims, "CLAIMS", chosen)
+    hit = (arm.PLACES[0], arm.ANGLES[0])
+    strike = broken(arm.strike, lambda robot, place, angle, e: (place, angle) == hit)
+    monkeypatch.setattr(arm, "strike", strike)
+    failures = []
+    first, second = topics.checked_claims("claims", Runner(tmp_path), "quick", nothing, failures)
     assert (first.verdict, first.tables["C01"].rows) == (NOT_COMPUTED, ())
     assert len(second.tables["C07"].rows) == 2 * len(arm.PLACES) * len(arm.ANGLES) - 2
+    assert [failure.case for failure in failures] == [
+        "C01",
+        "C07, uniform rods, 0.0, 0.1",
+        "C07, point masses at the ends of the links, 0.0, 0.1",
+    ]
 
 
-def of_runs(patch, folder, failures):
-    patch.setattr(
-        runs,
-        "FIGURE_RUNS",
-        {name: runs.FIGURE_RUNS[name] for name in ("corner/IAPB", "device/IAPB")},
-    )
-    patch.setattr(
-        runs,
-        "shipped_scene",
-        broken(runs.shipped_scene, lambda name, values: values),
-    )
-    assert list(runs.figure_runs(Runner(folder), nothing, failures)) == ["corner/IAPB"]
-
-
-@pytest.mark.parametrize(
-    ("stage", "failed"),
-    [
-        (
-            of_claims,
-            [
-                "C01",
-                "C07, uniform rods, 0.0, 0.1",
-                "C07, point masses at the ends of the links, 0.0, 0.1",
-            ],
-        ),
-        (of_runs, ["device/IAPB"]),
-    ],
-)
-def test_a_case_that_raises_costs_its_row_only(stage, failed, monkeypatch, tmp_path):
+def test_a_run_of_a_figure_that_raises_leaves_the_others(monkeypatch, tmp_path):
+    chosen = {name: runs.FIGURE_RUNS[name] for name in ("corner/IAPB", "device/IAPB")}
+    monkeypatch.setattr(runs, "FIGURE_RUNS", chosen)
+    fails = broken(runs.shipped_scene, lambda name, values: values)
+    monkeypatch.setattr(runs, "shipped_scene", fails)
     failures = []
-    stage(monkeypatch, tmp_path, failures)
-    assert [failure.case for failure in failures] == failed
+    assert list(runs.figure_runs(Runner(tmp_path), nothing, failures)) == ["corner/IAPB"]
+    assert [failure.case for failure in failures] == ["device/IAPB"]
 
 
 def test_the_last_lines_say_what_failed_and_where_the_traceback_is(monkeypatch, tmp_path):
