@@ -3,12 +3,10 @@ caller's choices."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from ruamel.yaml import YAML
 
 from iapb.contact.laws import ImpulseAugmented, Penalty
 from iapb.effects import EFFECTS, Effect
@@ -16,12 +14,10 @@ from iapb.haptics.coupling import FourChannel, NoCoupling
 from iapb.scene import Scene, find_scene, load_scene, scene_names
 from iapb.system import decide_effects
 from reference.time_stepping import RigidConstraints
+from tests.given import data_of
 
 PEG = load_scene(find_scene("peg_corner"))
-SWITCHES, CASES = (
-    YAML(typ="safe").load(Path(__file__).with_name(name))
-    for name in ("switches.yaml", "chosen.yaml")
-)
+SWITCHES, CASES = (data_of(__file__, name) for name in ("switches.yaml", "chosen.yaml"))
 
 
 def effect(scene: Scene, name: str, *choices: Any) -> Effect:

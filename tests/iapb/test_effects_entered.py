@@ -9,10 +9,10 @@ import json
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
-from ruamel.yaml import YAML
+
+from tests.given import data_of
 
 COUNTER = """
 import json, sys
@@ -49,7 +49,7 @@ cases = json.load(sys.stdin)
 print(json.dumps({name: calls_of_steps(case) for name, case in cases.items()}))
 """
 
-GIVEN = YAML(typ="safe").load(Path(__file__).with_name("entered.yaml"))
+GIVEN = data_of(__file__, "entered.yaml")
 CASES = GIVEN["cases"]
 
 

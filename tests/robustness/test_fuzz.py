@@ -23,7 +23,6 @@ import numpy as np
 import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
-from ruamel.yaml import YAML
 
 from iapb import decide_effects, load_scene, simulate
 from iapb.errors import IapbError, RunFileError
@@ -35,6 +34,7 @@ from reports.commands.inspect import inspect
 from reports.store.io import sealed
 from reports.store.records import read_record
 from reports.sweep import load_study
+from tests.given import data_of
 from tests.robustness.samples import TIMES, fclib_files, result_files
 
 pytestmark = pytest.mark.thorough
@@ -46,7 +46,7 @@ BROKEN = "broken"
 LONGEST = 20.0
 MEMORY = 4 << 30  # bytes beyond what the process has: a wrong file may not ask for more
 STEPS = 3  # of a scene that is read all the same: it must also start
-GIVEN = YAML(typ="safe").load(Path(__file__).with_name("tokens.yaml"))
+GIVEN = data_of(__file__, "tokens.yaml")
 TOKENS = [*sum(GIVEN["tokens"], []), "9" * 400, "e" * 3000]
 VALUES = [*sum(GIVEN["values"], []), ["a"] * 50]
 MOST_CHANGES = 4  # per case: more, and the first mistake hides the others

@@ -4,18 +4,17 @@ right gets none."""
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from ruamel.yaml import YAML
 
 from iapb.advice.checks import Start, check_scene, step_limits
 from iapb.scene import Scene, find_scene, load_scene, scene_names
 from iapb.scene.reading import scene_from_values
+from tests.given import data_of
 
-GIVEN = YAML(typ="safe").load(Path(__file__).with_name("warned.yaml"))
+GIVEN = data_of(__file__, "warned.yaml")
 BOX = scene_from_values(GIVEN["base"])
 WARNED = GIVEN["warned"]
 

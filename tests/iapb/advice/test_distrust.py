@@ -4,12 +4,10 @@ passes through."""
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from ruamel.yaml import YAML
 
 from iapb.advice.distrust import distrust_of
 from iapb.contact.geometry import SPHERE, Shape, make_shapes
@@ -17,17 +15,15 @@ from iapb.contact.solids import solids_of
 from iapb.run import Run
 from iapb.scene.reading import scene_from_values
 from iapb.simulation import simulate
+from tests.given import data_of, scene_with
 
-GIVEN = YAML(typ="safe").load(Path(__file__).with_name("distrusted.yaml"))
+GIVEN = data_of(__file__, "distrusted.yaml")
 PASSAGES = GIVEN["passages"]
 SIDE = 0.1  # of the box that falls
 
 
 def run_of(name: str, steps: int, **values: Any) -> Run:
-    """A run of a scene of the file; values by their paths, with __ for each dot."""
-    scene = scene_from_values(GIVEN["scenes"][name])
-    changed = {path.replace("__", "."): value for path, value in values.items()}
-    return simulate(scene.with_values(changed), steps=steps)
+    return simulate(scene_with(GIVEN["scenes"][name], **values), steps=steps)
 
 
 def test_a_run_that_gains_energy_says_so_wherever_it_is_shown() -> None:

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from ruamel.yaml import YAML
 
 from iapb.advice.checks import Caution, check_scene
 from iapb.advice.loops import CLOSE, SLOW, HapticLoop
 from iapb.run import Run
 from iapb.scene import Scene
-from iapb.scene.reading import scene_from_values
 from iapb.simulation import simulate
 from iapb.system import coupling_of
+from tests.given import data_of, scene_with
 
 # The criterion alone
 
@@ -87,14 +85,12 @@ def test_a_loop_grows_where_the_step_has_an_eigenvalue_outside_the_circle(d: int
 
 # Scenes
 
-GIVEN = YAML(typ="safe").load(Path(__file__).with_name("growing.yaml"))
+GIVEN = data_of(__file__, "growing.yaml")
 GROWING = GIVEN["growing"]
 
 
 def scene_of(base: str, **values: Any) -> Scene:
-    """A scene of the file; values by their paths, with __ for each dot."""
-    changed = {path.replace("__", "."): value for path, value in values.items()}
-    return scene_from_values(GIVEN[base]).with_values(changed)
+    return scene_with(GIVEN[base], **values)
 
 
 def growing(name: str) -> Scene:

@@ -4,12 +4,10 @@ change."""
 from __future__ import annotations
 
 from collections import Counter
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from ruamel.yaml import YAML
 
 from iapb.contact import finding
 from iapb.contact.finding import ContactFinder
@@ -19,6 +17,7 @@ from iapb.scene.reading import scene_from_values
 from iapb.simulation import simulate
 from iapb.system import System
 from reports.store.keys import content_hash
+from tests.given import data_of
 from tests.iapb.contact.convex import convex, directions, separations
 from tests.iapb.contact.paper import scene_of
 from verification.cost.steps import field_of_discs
@@ -26,13 +25,11 @@ from verification.cost.steps import field_of_discs
 Values = dict[str, Any]
 
 
-def data(name: str) -> Any:
-    return YAML(typ="safe").load(Path(__file__).with_name(name))
-
-
-CROWD = data("crowd.yaml")
-CROWDS = {True: System(scene_from_values(CROWD["space"]))}
-CROWDS[False] = System(scene_from_values(CROWD["plane"]))
+CROWD = data_of(__file__, "crowd.yaml")
+CROWDS = {
+    False: System(scene_from_values(CROWD["plane"])),
+    True: System(scene_from_values(CROWD["space"])),
+}
 SPACES = pytest.mark.parametrize("space", [False, True])
 
 
@@ -116,7 +113,7 @@ def test_names_last_while_bodies_move_a_little(space: bool) -> None:
         }
 
 
-GIVEN = data("exact_gaps.yaml")
+GIVEN = data_of(__file__, "exact_gaps.yaml")
 DISC, BRICK, BALL, CUBE = (GIVEN["shapes"][name] for name in ("disc", "brick", "ball", "cube"))
 EXACT = GIVEN["gaps"]
 

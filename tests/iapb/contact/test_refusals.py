@@ -4,18 +4,17 @@ laws."""
 from __future__ import annotations
 
 from fractions import Fraction
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from ruamel.yaml import YAML
 
 from iapb import RangeError, resolve_frictional_impact, resolve_impact, resolve_impacts
 from iapb.contact.laws import ImpulseAugmented, Penalty
 from iapb.errors import ArgumentError
 from iapb.scene import find_scene, load_scene
 from iapb.system import System
+from tests.given import data_of
 
 NAN = float("nan")
 ONE = {
@@ -37,7 +36,7 @@ BORDERS = {
     "friction": (resolve_frictional_impact, RUBBING),
 }
 
-GIVEN = YAML(typ="safe").load(Path(__file__).with_name("refused.yaml"))
+GIVEN = data_of(__file__, "refused.yaml")
 REFUSED = [
     (border, argument, value, place)
     for borders, arguments in GIVEN.items()

@@ -4,20 +4,19 @@ one tree meet. What stands and what crosses seams: verification/ordinary."""
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from ruamel.yaml import YAML
 from scipy.spatial.transform import Rotation
 
 from iapb.advice.distrust import UNACCOUNTED, distrust_of
 from iapb.scene import Scene
 from iapb.scene.reading import scene_from_values
 from iapb.simulation import simulate
+from tests.given import data_of
 
-GIVEN = YAML(typ="safe").load(Path(__file__).with_name("rigid.yaml"))
+GIVEN = data_of(__file__, "rigid.yaml")
 
 
 def scene_of(name: str, **values: Any) -> Scene:

@@ -3,12 +3,10 @@ motion, judged from the record alone."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from ruamel.yaml import YAML
 
 from iapb import resolve_frictional_impact, resolve_impact
 from iapb.contact.laws import ImpulseAugmented, Penalty
@@ -17,6 +15,7 @@ from iapb.scene import Scene, find_scene, load_scene
 from iapb.scene.reading import scene_from_values
 from iapb.simulation import simulate
 from iapb.system import System
+from tests.given import data_of
 from tests.iapb.contact import paper
 from verification.certificate import certify
 
@@ -24,7 +23,7 @@ Values = dict[str, Any]
 ROUNDING = 1e-9  # of sums of a few dozen products, in units of the largest
 
 
-GIVEN = YAML(typ="safe").load(Path(__file__).with_name("steps.yaml"))
+GIVEN = data_of(__file__, "steps.yaml")
 CASES = GIVEN["cases"]
 
 

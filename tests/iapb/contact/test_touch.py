@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from ruamel.yaml import YAML
 
 from iapb.contact.laws import ImpulseAugmented
 from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling
 from iapb.scene import Scene, scene_from_text
 from iapb.scene.reading import scene_from_values
 from iapb.simulation import simulate
+from tests.given import data_of
 from verification.certificate import certify
 from verification.ordinary.touch import INERTIA, G, heights, toss_values, tossed
 
@@ -170,7 +169,7 @@ walls: [{name: wall, kind: half_plane, point: [0, 0], normal: [1, 0]}]
     assert (first > 0.0) == isinstance(coupling, NoCoupling)
 
 
-GIVEN = YAML(typ="safe").load(Path(__file__).with_name("boxes.yaml"))
+GIVEN = data_of(__file__, "boxes.yaml")
 BOXES = scene_from_values(GIVEN)
 
 

@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from ruamel.yaml import YAML
 
 from iapb.errors import ArgumentError, SceneError
 from iapb.scene import Scene, find_scene, load_scene, scene_from_text
+from tests.given import data_of
 
 PLANE = """\
 name: full
@@ -51,7 +51,7 @@ walls:
 FULL = scene_from_text(PLANE)
 FULL_SPACE = scene_from_text(SPACE)
 
-REFUSED = YAML(typ="safe").load(Path(__file__).with_name("refused.yaml"))
+REFUSED = data_of(__file__, "refused.yaml")
 LONG = {
     "title": ["x" * 2001],
     "source": ["x" * 2001],

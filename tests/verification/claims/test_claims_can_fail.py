@@ -2,15 +2,14 @@
 row cannot tell."""
 
 import re
-from pathlib import Path
 
 import pytest
-from ruamel.yaml import YAML
 
+from tests.given import data_of
 from verification.claims import CLAIMS, algebraic, peg, socket, walls
 
 MODULES = {"algebraic": algebraic, "peg": peg, "socket": socket, "walls": walls}
-GIVEN = YAML(typ="safe").load(Path(__file__).with_name("rows.yaml"))
+GIVEN = data_of(__file__, "rows.yaml")
 ROWS = [(claims, row, held) for claims, rows in GIVEN.items() for row, held in rows]
 
 

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-from ruamel.yaml import YAML
 
 from iapb.run import Run
 from iapb.scene import Scene
 from iapb.scene.mechanism import mechanism_of
 from iapb.scene.reading import scene_from_values
 from iapb.simulation import simulate
+from tests.given import data_of
 
-GIVEN = YAML(typ="safe").load(Path(__file__).with_name("free_motion.yaml"))
+GIVEN = data_of(__file__, "free_motion.yaml")
 BODY = scene_from_values(GIVEN["body"])
 PLANE = scene_from_values(GIVEN["robot in the plane"])
 TURNED = [[2e-3, 3e-4, 1e-4], [3e-4, 2e-3, -2e-4], [1e-4, -2e-4, 3e-3]]
