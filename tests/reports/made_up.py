@@ -1,13 +1,10 @@
-"""A made-up run with every array filled, and inputs of the figures."""
+"""Short runs, inputs of the figures, and made-up records of a report."""
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
-import numpy as np
-
 from iapb import find_scene, load_scene
-from iapb.numerics.schema import blank, quantities
-from iapb.run import ContactTable, EffectRow, ImpactTable, Run
 from reference.worlds import run_world
 from reports.evidence.runs import CORNER_SCENE, FIGURE_RUNS, TILTED, corner_scene
 from reports.figures.corner import UNLIMITED
@@ -18,29 +15,7 @@ from reports.uses import StoredFile
 from verification.finding import MIXED, REFUTED, REPRODUCED, Part, finding_of
 from verification.table import titled
 
-NAMES = ("peg.x", "peg.y", "peg.theta")
-TEXTS = {
-    "scene_name": "peg",
-    "scene_source": "name: peg\n# with a comment, é\n",
-    "world": "IAPB",
-    "scene_resolved": {"name": "peg", "rate": 512, "bodies": [{"mass": 2.0}]},
-    "law": "impulse augmented",
-    "law_settings": {"restitution": 0.0, "limits": [15.0, 15.0, 1.0]},
-    "coupling": "four channel",
-    "coupling_settings": {"stiffness": [100.0, 100.0, 0.5]},
-    "dt": 1 / 512,
-    "complete": True,
-    "coordinate_names": NAMES,
-    "coordinate_units": ("m", "m", "rad"),
-    "velocity_names": NAMES,
-    "velocity_units": ("m/s", "m/s", "rad/s"),
-    "body_names": ("peg",),
-    "effects": (
-        EffectRow("gravity", False, "the scene names none"),
-        EffectRow("friction", True, "μ = 0.3"),
-        EffectRow("contact_damping", False, "no springs", "damping"),
-    ),
-}
+PEG = load_scene(find_scene("peg_corner"))
 
 
 def flipped(content, share=0.5):
@@ -49,56 +24,10 @@ def flipped(content, share=0.5):
     return content[:at] + bytes([content[at] ^ 1]) + content[at + 1 :]
 
 
-def made_run(steps=20, contacts=7, impacts=3, seed=0, **fields):
-    """Return a small run with every array filled."""
-    rng = np.random.default_rng(seed)
-    tool_dofs = fields.pop("tool_dofs", (0, 3))
-    device = tool_dofs[1] - tool_dofs[0]
-    lengths = {
-        "time": steps + 1,
-        "step": steps,
-        "step_edge": steps + 1,
-        "contact": contacts,
-        "impact": impacts,
-        "coordinate": len(fields.get("coordinate_names", "xyz")),
-        "velocity": 3,
-        "device_coordinate": device,
-        "device_velocity": device,
-        "body": 1,
-        "placement": 3,
-        "axis": 3,
-    }
-
-    def filled(listed):
-        return {
-            name: rng.normal(size=array.shape)
-            if array.dtype.kind == "f"
-            else rng.integers(0, 2, array.shape).astype(array.dtype)
-            for name, array in blank(listed, lengths).items()
-        }
-
-    contact = filled(quantities(ContactTable))
-    impact = filled(quantities(ImpactTable))
-    contact |= {
-        "offsets": np.array([0, *np.sort(rng.integers(0, contacts + 1, steps - 1)), contacts]),
-        "gap": -np.abs(contact["gap"]),
-    }
-    impact |= {"step": np.arange(impacts), "energy_lost": np.abs(impact["energy_lost"])}
-    values = (
-        TEXTS
-        | filled((*quantities(Run, "time"), *quantities(Run, "step")))
-        | {
-            "tool_dofs": tool_dofs,
-            "tool_coordinates": tool_dofs,
-            "time": np.arange(steps + 1) / 512,
-            "contacts": ContactTable(**contact),
-            "impacts": ImpactTable(**impact),
-            "energy": {"kinetic": rng.random(steps + 1), "impact_loss": rng.random(steps)},
-            "chunk_steps": np.array([steps], np.int64),
-            "chunk_seconds": np.array([0.5]),
-        }
-    )
-    return Run(**{**values, **fields})
+def made_run(restitution=0.0, **fields):
+    """A short run of the peg in the corner, with some fields changed."""
+    scene = PEG.with_values({"duration": 0.4, "contact.restitution": restitution})
+    return replace(run_world(scene, "IAPB"), **fields)
 
 
 @cache
@@ -106,7 +35,7 @@ def figure_inputs():
     """The inputs of all figures: tables of a report, thinned, and runs of the peg that differ in the
     stiffness of the walls."""
     tables = read_numbers(Path(__file__).with_name("figures.json")).tables
-    peg = load_scene(find_scene("peg_corner")).with_values({"duration": 1.0})
+    peg = PEG.with_values({"duration": 1.0})
     runs = {
         name: run_world(peg.with_values({"contact.stiffness": 900.0 + 50.0 * k}), "IAPB")
         for k, name in enumerate(FIGURE_RUNS)

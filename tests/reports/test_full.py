@@ -47,7 +47,7 @@ def test_ctrl_c_tells_what_was_judged_until_then_and_stores_a_run_that_breaks_a_
     said = capsys.readouterr().out
     assert "2 of " in said and "then stopped" in said and "BROKEN ledger: 1 of 2 break it" in said
     assert "out/runs/trajectories-seed0-7.h5" in said
-    assert read_run(tmp_path / "out/runs/trajectories-seed0-7.h5").steps == 20
+    assert read_run(tmp_path / "out/runs/trajectories-seed0-7.h5").world == "IAPB"
 
 
 @pytest.mark.parametrize("part", ["truncation", "device_limits", TRAJECTORIES])
