@@ -34,7 +34,6 @@ PEERS = (
     "mujoco",
 )
 UNKNOWN = "unknown"
-NOT_INSTALLED = "not installed"
 
 
 def collect_provenance(
@@ -49,15 +48,7 @@ def collect_provenance(
         on.
     """
     given = {"seeds": ", ".join(map(str, seeds)) or "none", "command": current_command()}
-    versions = {package: package_version(package) for package in packages}
-    return (
-        _facts()
-        | given
-        | {
-            package: NOT_INSTALLED if found == UNKNOWN else found
-            for package, found in versions.items()
-        }
-    )
+    return _facts() | given | {package: package_version(package) for package in packages}
 
 
 def current_command() -> str:
@@ -94,11 +85,11 @@ def _facts() -> dict[str, str]:
 
 
 def package_version(package: str) -> str:
-    """Return the version of an installed package, or ``unknown``."""
+    """Return the version of an installed package, or ``not installed``."""
     try:
         return version(package)
     except PackageNotFoundError:
-        return UNKNOWN
+        return "not installed"
 
 
 def lock_hash() -> str:

@@ -97,12 +97,6 @@ class Plot:
             axis.set_major_formatter(lambda value, _: power_of_ten(value))
             axis.set_minor_locator(NullLocator())
 
-    def ticks(self, axis: str, values: Iterable[float]) -> None:
-        """Write numbers at the places on "x" or "y" that are in view."""
-        low, high = sorted(getattr(self.axes, f"get_{axis}lim")())
-        shown = [value for value in values if low <= value <= high]
-        getattr(self.axes, f"set_{axis}ticks")(shown, [f"{value:g}" for value in shown])
-
 
 def note(
     axes: Any, point: Any, text: str, offset: tuple[float, float] = (0.0, 0.0), **how: Any

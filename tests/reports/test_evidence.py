@@ -307,4 +307,3 @@ def test_the_last_lines_say_what_failed_and_where_the_traceback_is(monkeypatch, 
     assert f"tracebacks: {path}" in said and "figures: hero: ValueError: planted" in said
     assert "in fails" in (tmp_path / "tables" / "figures-failed.txt").read_text(encoding="utf-8")
     assert "C22: ValueError: planted" in (tmp_path / "report" / "data.html").read_text("utf-8")
-    assert "Not computed in this run" in (tmp_path / "report.html").read_text("utf-8")
