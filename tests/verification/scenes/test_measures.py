@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from iapb import find_scene
+from iapb import find_scene, load_scene
 from verification.claims.conditions import Condition
 from verification.scenes import measures
 
 STEPS = 100
 DT = 0.01
+AT = np.arange(STEPS + 1)  # instants, in steps
 
 
 def trace(device=None, velocity=None, force=None, contact_at=10, tool=None):
@@ -20,7 +21,7 @@ def trace(device=None, velocity=None, force=None, contact_at=10, tool=None):
     new[contact_at] = True
     device = states if device is None else device
     return measures.Trace(
-        np.arange(STEPS + 1) * DT,
+        AT * DT,
         device,
         device if tool is None else tool,
         states if velocity is None else velocity,
@@ -42,12 +43,12 @@ def column(values, index):
     return out
 
 
-UNTIL_50 = column(np.arange(STEPS + 1) <= 50, 0)
+UNTIL_50 = column(AT <= 50, 0)
 FOREVER = column(np.full(STEPS + 1, 0.1), 2)
 
 
 def test_distances_are_taken_in_the_window():
-    late = np.where(np.arange(STEPS + 1) >= 20, 2e-3, 0.0)
+    late = np.where(AT >= 20, 2e-3, 0.0)
     ours = trace(device=column(late, 1))
     ideal = trace()
     assert measures.root_mean_square(ours, ideal, slice(20, 60)) == pytest.approx([0.0, 2e-3, 0.0])
@@ -67,9 +68,7 @@ def test_window_goes_from_the_first_contact_to_the_last_settling():
 def test_settling_counts_from_the_first_contact():
     assert measures.settling_time(trace(velocity=UNTIL_50, contact_at=10)) == pytest.approx(0.41)
     assert measures.settling_time(trace(velocity=FOREVER)) is None
-    slowing = trace(
-        velocity=column(1e-3 * 2.0 ** (2.5 - np.arange(STEPS + 1) / 20), 0), contact_at=10
-    )
+    slowing = trace(velocity=column(1e-3 * 2.0 ** (2.5 - AT / 20), 0), contact_at=10)
     assert measures.settling_times(slowing) == pytest.approx(
         [0.6, 0.4, 0.2]
     )  # below 0.5, 1 and 2 mm/s
@@ -89,7 +88,7 @@ def test_a_spike_one_step_later_hardly_counts_and_a_missing_one_counts_in_full()
 def test_balance_is_judged_in_contact_and_outside_collisions():
     """x touches the right wall from step 20 on, y never; step 30 collides, step 60 is out of
     balance by 5 N."""
-    x = np.where(np.arange(STEPS + 1) < 20, 0.05, 0.0105)
+    x = np.where(AT < 20, 0.05, 0.0105)
     force = np.tile([0.32, 9.0, 0.0], (STEPS, 1)) + column(80.0 * np.eye(1, STEPS, 30)[0], 0)
     force += column(5.0 * np.eye(1, STEPS, 60)[0], 0) + column(7.0 * np.eye(1, STEPS, 5)[0], 0)
     states = np.column_stack([x, np.full((STEPS + 1, 2), (-0.05, 0.0))])
@@ -101,7 +100,7 @@ def test_balance_is_judged_in_contact_and_outside_collisions():
 
 
 def test_impacts_separate_in_their_own_step_only():
-    apart = column(np.where(np.arange(STEPS + 1) > 40, 3e-4, 0.0), 0)  # in step 40
+    apart = column(np.where(AT > 40, 3e-4, 0.0), 0)  # in step 40
     parted = trace(tool=apart, device=np.zeros_like(apart))
     assert measures.separation_by_impacts(parted).max() == 0.0
     assert measures.separation_by_impacts(replace(parted, impact_step=np.array([10, 40])))[
@@ -121,10 +120,10 @@ def test_the_overlap_of_the_device_is_that_of_its_deepest_corner():
     ("heights", "count"),
     [
         (
-            1e-3 * ((np.arange(STEPS + 1) >= 30) & (np.arange(STEPS + 1) < 40)),
+            1e-3 * ((AT >= 30) & (AT < 40)),
             2,
         ),  # both corners, once
-        *((height * (np.arange(STEPS + 1) % 2), 0) for height in (0.0, 5e-6, -2e-4)),
+        *((height * (AT % 2), 0) for height in (0.0, 5e-6, -2e-4)),
     ],
 )
 def test_a_hop_is_a_bounce_of_both_corners_flicker_and_overlap_are_none(heights, count):
@@ -134,8 +133,6 @@ def test_a_hop_is_a_bounce_of_both_corners_flicker_and_overlap_are_none(heights,
 
 @pytest.mark.parametrize("tilt", [0.0, 0.2, -0.3])
 def test_a_start_has_the_clearance_and_the_travel_it_says(tilt):
-    from iapb import load_scene
-
     placed = Condition(tilt, clearance=0.012, travel=0.007).place(
         load_scene(find_scene("peg_corner"))
     )
