@@ -326,6 +326,9 @@ class Scene(ScenePart):
     name: SceneName = Field(description="the scene's name; runs are filed under it")
     title: Text = Field("", description="one line for reports")
     source: Text = Field("", description="where the scene comes from")
+    dimensions: Literal[2] = Field(
+        2, exclude=True, description="3 for a scene in space; default 2, a scene in the plane"
+    )
     rate: Annotated[Positive, Field(le=MAX_RATE)] = Field(
         description="simulation rate [Hz]; the step is 1/rate"
     )
@@ -475,9 +478,7 @@ class Scene(ScenePart):
 class SpatialScene(Scene):
     """A scene in space: like `Scene`, but vectors have three numbers."""
 
-    dimensions: Literal[3] = Field(
-        description="3: a scene in space; a scene without this field is planar"
-    )
+    dimensions: Literal[3] = Field(description="3: a scene in space")  # type: ignore[assignment]
     gravity: Gravity[Vector3] = None  # type: ignore[assignment]
     bodies: Bodies[SpatialBody]  # type: ignore[assignment]
     walls: Walls[SpatialWall] = ()  # type: ignore[assignment]
@@ -607,7 +608,8 @@ def _tool(given: dict[str, Any], bodies: list[_Outline]) -> Mistakes:
 
 def scene_kind(given: Any) -> type[Scene]:
     """Return the class of scene that plain values describe: `SpatialScene` or `Scene`."""
-    return SpatialScene if isinstance(given, dict) and "dimensions" in given else Scene
+    space = isinstance(given, dict) and given.get("dimensions", 2) != 2
+    return SpatialScene if space else Scene
 
 
 def set_value(plain: dict[str, Any], path: Any, value: Any) -> None:
@@ -654,8 +656,7 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 def scene_schema() -> dict[str, Any]:
     """Return the JSON Schema of scene files; the description of each field gives its default.
 
-    As in the reader, a file with the field `dimensions` is a scene in space, any other file a
-    planar scene.
+    As in the reader, a file without `dimensions`, or with 2, is a scene in the plane.
     """
     _, schema = models_json_schema(
         [(model, "validation") for model in (Scene, SpatialScene, Robot)]
@@ -678,8 +679,8 @@ def scene_schema() -> dict[str, Any]:
         "$schema": DIALECT,
         "title": "Scene file",
         "type": "object",
-        "if": {"required": ["dimensions"]},
-        "then": {"$ref": "#/$defs/SpatialScene"},
-        "else": {"$ref": "#/$defs/Scene"},
+        "if": {"properties": {"dimensions": {"const": 2}}},
+        "then": {"$ref": "#/$defs/Scene"},
+        "else": {"$ref": "#/$defs/SpatialScene"},
         "$defs": schema["$defs"],
     }
