@@ -235,9 +235,8 @@ def unit_tangents(normals: Floats, spatial: bool) -> Floats:
     space."""
     if not spatial:
         return np.cross([0.0, 0.0, 1.0], normals)[:, None]
-    least = np.eye(3)[
-        np.argmin(np.abs(normals), axis=1)
-    ]  # the coordinate axis that is farthest from the normal
+    # the coordinate axis that is farthest from the normal
+    least = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
     first = np.cross(normals, least)
     first /= np.linalg.norm(first, axis=1)[:, None]
     return np.stack([first, np.cross(normals, first)], axis=1)

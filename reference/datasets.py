@@ -221,9 +221,8 @@ def _matrix(budget: Budget, group: Any, most: int) -> Any:
         compressed = (sparse.csr_matrix if nz == _ROWS else sparse.csc_matrix)(
             (x, i, p), shape=(m, n)
         )
-        compressed.check_format(
-            full_check=True
-        )  # an index out of range would write outside the array
+        # an index out of range would write outside the array
+        compressed.check_format(full_check=True)
         # not seen by it where the last pointer is 0
         if np.any(compressed.indptr[1:] < compressed.indptr[:-1]):
             raise ValueError(f"{group.name}: the pointers p decrease")

@@ -73,9 +73,8 @@ class RigidStep(NamedTuple):
     """Result of one rigid step."""
 
     velocity: Floats  #: (d,) v⁺
-    impulse: (
-        Floats  #: (c,) p >= 0 [N s], zero for contacts left out; not unique for redundant contacts
-    )
+    #: (c,) p >= 0 [N s], zero for contacts left out; not unique for redundant contacts
+    impulse: Floats
     residual: float  #: recomputed natural-map residual of the step's LCP, relative to the velocities involved
 
 

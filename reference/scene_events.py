@@ -56,9 +56,8 @@ Contact = tuple[int, int, int]
 class Tolerances(NamedTuple):
     """Tolerances of one computation."""
 
-    accuracy: float = (
-        1e-11  #: tolerance of the integrator, far below the errors of time stepping (1e-3 to 1e-6)
-    )
+    #: tolerance of the integrator, far below the errors of time stepping (1e-3 to 1e-6)
+    accuracy: float = 1e-11
     closed: float = 1e-8  #: largest gap [m] of a closed contact: scenes touch to 1e-9, and event roots err by 1e-11
     at_rest: float = 1e-9  #: largest normal velocity [m/s] of a contact at rest: a hundred times the integrator's error
     released: float = 1e-8  #: share of the accelerations below which an acceleration counts as zero
@@ -100,9 +99,8 @@ class SceneTruth:
 
     coordinates: int  #: length of q
     velocities: int  #: length of v
-    segments: tuple[
-        tuple[float, float, Callable[[float], Floats]], ...
-    ]  #: start, stop, t -> (q, v, device's q and v)
+    #: start, stop, t -> (q, v, device's q and v)
+    segments: tuple[tuple[float, float, Callable[[float], Floats]], ...]
     events: tuple[float, ...]  #: [s]
     bound: Bound = Bound(np.nan, np.nan, np.nan)  #: estimate of the errors
 
@@ -310,9 +308,8 @@ class _Motion:
                 falling = ~resting & (away < 0.0)
                 self.flight = float((speed[falling] / -away[falling]).min(initial=np.inf)) * 2.0
                 return resting & (away <= _KEPT * self._least(here))
-            heights = speed[back] ** 2 / (
-                -2.0 * away[back]
-            )  # each bounce has e² times the height of the last one
+            # each bounce has e² times the height of the last one
+            heights = speed[back] ** 2 / (-2.0 * away[back])
             shrinking = max(1.0 - self.restitution**2, np.finfo(float).tiny)
             self.bounced += float(
                 np.minimum(2.0 * heights / shrinking, speed[back] * self.duration).sum()

@@ -524,9 +524,8 @@ def _too_deep(start: Start, rows: Rows, resting: float) -> bool:
     mass = 1.0 / max(np.max(np.sum(J * start.moved(J).T, axis=1)), 1e-300)
     kinetic = 0.5 * mass * np.abs(J @ start.v).max() ** 2
     weight = mass * np.abs(start.pull[rows]).max()
-    usual = max(
-        kinetic + weight * DEEP * size, 0.5 * mass * size**2
-    )  # the latter: moving by its size in a second
+    # the latter: moving by its size in a second
+    usual = max(kinetic + weight * DEEP * size, 0.5 * mass * size**2)
     return depth > DEEP * size or depth > 1e-6 * size and 0.5 * K * np.sum(gap**2) > usual
 
 

@@ -37,14 +37,8 @@ METHODS = ("factored", "poisson")
 NEWTON = "Newton, equality"
 POISSON = "Poisson, two LCPs"
 COULOMB = "Newton, equality, with Coulomb friction"
-_STATUS = (
-    "complete",
-    "budget",
-    "cancelled",
-    "reduced",
-    "not solved",
-    "scaled",
-)  # codes of the kernel
+# codes of the kernel
+_STATUS = ("complete", "budget", "cancelled", "reduced", "not solved", "scaled")
 _resolve_each = Entry(resolve_each)
 _ONE = "mass_matrix", "contact_jacobian", "velocity"
 _MANY = "mass_matrices", "contact_jacobians", "velocities"

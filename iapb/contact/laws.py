@@ -202,9 +202,8 @@ class Penalty(_EngineLaw):
     impulses = False
     friction_in_impacts = pushing = False
     rendering = "full"
-    uses = frozenset(
-        {PENALTY, FRICTION, CLUSTERS, NEWNESS, JOINTS, JOINT_FRICTION}
-    )  # the record says which contacts are new
+    # the record says which contacts are new
+    uses = frozenset({PENALTY, FRICTION, CLUSTERS, NEWNESS, JOINTS, JOINT_FRICTION})
 
 
 _LAWS = (

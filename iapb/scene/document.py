@@ -156,7 +156,6 @@ def _field_text(field: str) -> str:
     yaml.default_flow_style = None
     yaml.width = 1_000_000
     yaml.sort_base_mapping_type_on_output = False
-    yaml.dump(
-        literal_eval(field), text
-    )  # with a nested list, or a single field would be written in braces
+    # with a nested list, or a single field would be written in braces
+    yaml.dump(literal_eval(field), text)
     return text.getvalue().rpartition('"":')[0]

@@ -353,9 +353,8 @@ class Scene(ScenePart):
         description="gains between device and tool",
     )
 
-    _source_text: str = PrivateAttr(
-        ""
-    )  # as read, or written at first use for a scene made of values
+    # as read, or written at first use for a scene made of values
+    _source_text: str = PrivateAttr("")
     _about: str = PrivateAttr("")  # comment above a text that is not yet written
     _file: str = PrivateAttr("")  # file that the text was read from, if any
     _remarks: tuple[str, ...] = PrivateAttr(())  # on the files of its robots
@@ -661,9 +660,8 @@ def scene_schema() -> dict[str, Any]:
     _, schema = models_json_schema(
         [(model, "validation") for model in (Scene, SpatialScene, Robot)]
     )
-    space = schema["$defs"][
-        "SpatialScene"
-    ]  # with bodies, or robots that the reader turns into bodies
+    # with bodies, or robots that the reader turns into bodies
+    space = schema["$defs"]["SpatialScene"]
     space["properties"]["robots"] = {
         "type": "array",
         "items": {"$ref": "#/$defs/Robot"},

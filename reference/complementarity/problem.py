@@ -32,13 +32,11 @@ class ImpactProblem:
     """A contact problem with n = contacts x contact_size unknown impulses p [N s]."""
 
     delassus: Floats  #: (n, n) W = J M⁻¹ Jᵀ [1/kg]
-    gamma_minus: (
-        Floats  #: (n,) contact velocities J v⁻ before the impact [m/s]; normals > 0 separate
-    )
+    #: (n,) contact velocities J v⁻ before the impact [m/s]; normals > 0 separate
+    gamma_minus: Floats
     restitution: Floats  #: (k,) Newton's e of each contact, in [0, 1]
-    friction: Floats | None = (
-        None  #: (k,) Coulomb's mu, or None for frictionless contacts (then contact_size is 1)
-    )
+    #: (k,) Coulomb's mu, or None for frictionless contacts (then contact_size is 1)
+    friction: Floats | None = None
     contact_size: int = 1  #: components per contact, normal first: 1, 2 (planar friction) or 3
     relaxed: bool = False  #: True drops the shift mu |u_T| from Coulomb's law (convex relaxation)
     name: str = ""

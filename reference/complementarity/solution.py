@@ -34,16 +34,13 @@ class Answer:
 class Residuals:
     """Residuals of an impulse, relative to the velocity scale; inf = unknown."""
 
-    impulse_cone: float = (
-        np.inf
-    )  #: distance of the scaled impulse from its cone (without friction: adhesive impulses)
-    velocity_cone: float = (
-        np.inf
-    )  #: distance of the complementary velocity from the dual cone (penetrating velocities)
+    #: distance of the scaled impulse from its cone (without friction: adhesive impulses)
+    impulse_cone: float = np.inf
+    #: distance of the complementary velocity from the dual cone (penetrating velocities)
+    velocity_cone: float = np.inf
     complementarity: float = np.inf  #: largest |p_i · w_i| of a contact
-    natural_map: float = (
-        np.inf
-    )  #: largest component of p - proj_K(p - w), which is zero only at solutions
+    #: largest component of p - proj_K(p - w), which is zero only at solutions
+    natural_map: float = np.inf
 
     @property
     def worst(self) -> float:

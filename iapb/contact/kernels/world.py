@@ -92,9 +92,8 @@ class World(NamedTuple):
     friction: np.ndarray  # (classes, classes) μ (6) of two shapes by their classes
     friction_velocity: float  # v_threshold [m/s] (6)
     restitution: float  # e of all contacts whose shapes give no e of their own
-    own_restitution: (
-        np.ndarray
-    )  # (shapes + stops,) e that a shape's body or wall gives, above 1 = none
+    # (shapes + stops,) e that a shape's body or wall gives, above 1 = none
+    own_restitution: np.ndarray
     approach_velocity: float  # v_approach [m/s]: slower approach is not a collision
     cluster_distance: float  # [m]
     coherence_distance: float  # [m]
@@ -193,9 +192,8 @@ class State(NamedTuple):
     friction_work: FrictionWork
     rest_work: RestWork
     located_q: Annotated[Floats, "coordinate"]  # configuration of mass_matrix and lower; NaN: any
-    root_momentum: Annotated[
-        Floats, "tree 9"
-    ]  # scratch of free motion: a root's momentum and its centre
+    # scratch of free motion: a root's momentum and its centre
+    root_momentum: Annotated[Floats, "tree 9"]
     tree_energy: Annotated[Floats, "tree"]  # of a tree, in free motion
     # of the step: `logged` (1,) lines in use, and (t,) lines of `iapb.run.ImpactTable`, without the
     # step

@@ -52,9 +52,8 @@ def daqp(rows: Floats, offset: Floats) -> Floats:
 
     n, d = rows.shape
     length = np.sqrt(np.einsum("ij,ij->i", rows, rows))
-    unit = np.where(
-        length > 0.0, length, 1.0
-    )  # unit rows, unit velocities: daqp's tolerances are absolute
+    # unit rows, unit velocities: daqp's tolerances are absolute
+    unit = np.where(length > 0.0, length, 1.0)
     lower = -offset / unit
     scale = float(np.abs(lower).max(initial=0.0)) or 1.0
     lower /= scale
