@@ -501,9 +501,9 @@ EFFECT_NAMES = tuple(EFFECTS)
 def decide(system: Any, law: Any = None, coupling: Any = None) -> tuple[Effect, ...]:
     """Decide which effects are on for a scene's system (see `iapb.system.decide_effects`)."""
     law = law.within(system.scene) if hasattr(law, "within") else law
-    uses = getattr(law, "uses", laws.EVERYTHING)
+    uses = getattr(law, "uses", laws.ASSUMED)
     if law is None:
-        uses = laws.EVERYTHING | {laws.JOINTS, laws.JOINT_FRICTION, laws.TOUCH}
+        uses = laws.ASSUMED | {laws.JOINTS, laws.JOINT_FRICTION, laws.TOUCH}
     question = Question(system, law, uses, coupling)
     return tuple(rule.decide(name, question) for name, rule in EFFECTS.items())
 

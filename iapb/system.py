@@ -68,7 +68,8 @@ class System:
         self.scene = scene
         self.mechanism: Mechanism = scene_parts.mechanism_of(scene)
         self.shapes = scene_parts.shapes_of(scene)
-        self.pairs, self.remarks = scene_parts.pairs_of(scene, self.mechanism, self.shapes)
+        self.pairs, left_out = scene_parts.pairs_of(scene, self.mechanism, self.shapes)
+        self.remarks = scene_parts.remarks_on(scene, left_out)
         self.stops = scene_parts.stops_of(scene, self.mechanism)
         stops = len(self.stops.bound)
         self.most_contacts = contact_capacity(self.shapes, self.pairs) + stops

@@ -3,8 +3,8 @@ protocol.
 
 The engine has two laws. `ImpulseAugmented`, the paper's law, applies impulses while a contact is
 new and penalty forces while it lasts. `Penalty` applies penalty forces alone: the same algorithm
-with e = −1 (claim C09). `reference.time_stepping` adds rigid constraints. Any class with `name`,
-`settings` and `advance` is a law.
+with e = −1, at which a collision changes nothing (claim C09). `reference.time_stepping` adds rigid
+constraints. Any class with `name`, `settings` and `advance` is a law.
 """
 
 from __future__ import annotations
@@ -33,7 +33,8 @@ OWN_RESTITUTION = "own restitution"
 JOINT_FRICTION = "joint friction"
 TOUCH = "touch"  # impacts at the moment of touch
 JOINTS = "joints"  # damping and limits of joints: a law that does not name this part ignores them
-EVERYTHING = frozenset(
+# what a law without `uses` is taken to use: not joints, nor the moment of touch
+ASSUMED = frozenset(
     {PENALTY, IMPULSES, FRICTION, CLUSTERS, NEWNESS, IMPACT_FRICTION, OWN_RESTITUTION}
 )
 
@@ -160,9 +161,8 @@ class ImpulseAugmented(_EngineLaw):
         if self.rendering not in RENDERINGS:
             raise ArgumentError("rendering", self.rendering, one_of(self.rendering, RENDERINGS))
         for name in ("friction_in_impacts", "pushing"):
-            if not isinstance(
-                getattr(self, name), bool | None if name == "friction_in_impacts" else bool
-            ):
+            allowed = bool | None if name == "friction_in_impacts" else bool
+            if not isinstance(getattr(self, name), allowed):
                 raise ArgumentError(name, getattr(self, name), "True or False")
         if self.friction_in_impacts and self.pushing:
             raise ArgumentError(
@@ -174,10 +174,8 @@ class ImpulseAugmented(_EngineLaw):
         law = super().within(scene)
         if law.friction_in_impacts is not None:
             return law
-        chosen = (
-            not law.pushing and scene.contact.forces != "paper" and scene.largest_friction > 0.0
-        )
-        return replace(law, friction_in_impacts=chosen)
+        coulomb = scene.contact.forces != "paper" and scene.largest_friction > 0.0
+        return replace(law, friction_in_impacts=coulomb and not law.pushing)
 
     @property
     def name(self) -> str:
@@ -190,19 +188,18 @@ class ImpulseAugmented(_EngineLaw):
     @property
     def uses(self) -> frozenset[str]:
         """Parts of the scene that the law uses."""
-        parts = EVERYTHING | {JOINTS, JOINT_FRICTION, TOUCH}
+        parts = ASSUMED | {JOINTS, JOINT_FRICTION, TOUCH}
         return parts if self.friction_in_impacts else parts - {IMPACT_FRICTION}
 
 
 @dataclass(frozen=True)
 class Penalty(_EngineLaw):
-    """Penalty forces alone: (5)-(6) act at every contact, new or old."""
+    """Penalty forces alone: (5)-(6) act at every contact, new or old. NEWNESS is for the record."""
 
     name = "penalty"
     impulses = False
     friction_in_impacts = pushing = False
     rendering = "full"
-    # the record says which contacts are new
     uses = frozenset({PENALTY, FRICTION, CLUSTERS, NEWNESS, JOINTS, JOINT_FRICTION})
 
 

@@ -1,8 +1,8 @@
 """Turn a scene into the engine's mechanism, shapes and candidate pairs, with restitution and
 friction of each pair.
 
-The bodies of a planar scene lie in the plane z = 0 of the spatial engine. BLAS is not used here,
-because its last bits depend on the processor.
+The bodies of a planar scene lie in the plane z = 0 of the spatial engine. What a step uses is made
+without BLAS, because its last bits depend on the processor.
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ from iapb.scene.parts import SMALLEST_POSITIVE
 
 Pairs = Indices
 
-UNSTATED = 2.0  # larger than any restitution, so that the minimum of two is a given one
+# of a body without restitution of its own: larger than any, so that the other body's counts
+UNSTATED = 2.0
 
 
 def mechanism_of(scene: Scene) -> Mechanism:
@@ -78,19 +79,38 @@ def start_of(scene: Scene) -> tuple[Floats, Floats]:
     return np.array(q, np.float64), np.array(v, np.float64)
 
 
-def joint_fault(scene: Scene) -> tuple[int, str, Any, str] | None:
-    """Return a body whose start is outside the limits of what follows its joint, or whose joint
-    moves no mass at the start; the field, its value and what was expected. None: nothing is wrong.
+class JointFault(NamedTuple):
+    """What is wrong with the joint of a body."""
 
-    The mass matrix is computed only if a joint moves neither mass nor inertia of its own body,
-    which a body that it carries may have.
+    body: int
+    field: str
+    value: Any
+    expected: str
+
+
+def joint_fault(scene: Scene) -> JointFault | None:
+    """Return the first joint that starts outside its limits or moves no mass; None: all are right.
+
+    Its limits are those of its own body and of every joint that follows it.
     """
+    return _start_outside_limits(scene) or _joint_without_mass(scene)
+
+
+def _start_outside_limits(scene: Scene) -> JointFault | None:
     for i, (body, limits) in enumerate(zip(scene.bodies, limits_of(scene), strict=True)):
         low, high = limits or (-math.inf, math.inf)
         if limits and not (low < high and low <= body.position[0] <= high):
             said = f"a start within [{low:g}, {high:g}], the range that the limits of {body.name} "
             said += "and of what follows it have in common"
-            return i, "position", list(body.position), said
+            return JointFault(i, "position", list(body.position), said)
+    return None
+
+
+def _joint_without_mass(scene: Scene) -> JointFault | None:
+    """Return a joint that moves no mass at the start.
+
+    The mass matrix is computed only if some body lacks mass or inertia of its own.
+    """
     if all(_moves_its_own(body) for body in scene.bodies):
         return None
     mechanism = mechanism_of(scene)
@@ -103,7 +123,8 @@ def joint_fault(scene: Scene) -> tuple[int, str, Any, str] | None:
     why = "no mass turns about it" if mechanism.arrays.dof_rotates[k] else "no mass moves along it"
     if mechanism.mass_matrix(q)[k, k] > SMALLEST_POSITIVE:
         why = "no mass lies between it and joints that move alike"
-    return i, "joint", body.joint, f"mass or inertia that it moves ({body.name}: {why})"
+    expected = f"mass or inertia that it moves ({body.name}: {why})"
+    return JointFault(i, "joint", body.joint, expected)
 
 
 def _moves_its_own(body: Any) -> bool:
@@ -117,8 +138,8 @@ def _moves_its_own(body: Any) -> bool:
 def require_joints(scene: Scene) -> None:
     """Raise ArgumentError for what `joint_fault` finds."""
     if fault := joint_fault(scene):
-        i, field, value, expected = fault
-        raise ArgumentError(f"{field} of {scene.bodies[i].name}", value, expected)
+        argument = f"{fault.field} of {scene.bodies[fault.body].name}"
+        raise ArgumentError(argument, fault.value, fault.expected)
 
 
 def wrench_of(scene: Scene, time: float) -> Floats:
@@ -136,9 +157,9 @@ def hand_force_of(scene: Scene, mechanism: Mechanism, q: Floats, time: float) ->
     if scene.hand is None or not wrench.any():
         return np.zeros(mechanism.nv)
     body = mechanism.index(scene.hand.body)
-    lever = mechanism.placements(q)[0][body] @ in_space(scene.hand.point)
+    lever = product(mechanism.placements(q)[0][body], in_space(scene.hand.point))
     wrench[3:] += np.cross(lever, wrench[:3])
-    return mechanism.frame_jacobian(q, body).T @ wrench
+    return product(mechanism.frame_jacobian(q, body).T, wrench)
 
 
 def gravity_of(scene: Scene) -> Floats:
@@ -169,8 +190,10 @@ def _by_velocity(mechanism: Mechanism, given: list[tuple[float, ...]], power: in
 
 
 def limits_of(scene: Scene) -> list[tuple[float, float] | None]:
-    """Return the limits of each body's own coordinate, within those of the joints that follow
-    it."""
+    """Return the limits of each body's coordinate, None where it has none.
+
+    Joints that follow it narrow them.
+    """
     ranges = ranges_of((body.name, body.joint_limits, body.joint_mimic) for body in scene.bodies)
     return [ranges.get(body.name) for body in scene.bodies]
 
@@ -235,16 +258,17 @@ def _placed(shape: Any, body: int, rotation: Floats, shift: Floats) -> geometry.
     return geometry.Shape(geometry.POLYGON, body, vertices=vertices)
 
 
-def pairs_of(scene: Scene, mechanism: Mechanism, shapes: Shapes) -> tuple[Pairs, tuple[str, ...]]:
-    """Return the candidate pairs (k, 2) of the scene's shapes (`shapes_of`), and the scene's remarks
-    with one on links that never touch, since they overlap at the start.
+def pairs_of(scene: Scene, mechanism: Mechanism, shapes: Shapes) -> tuple[Pairs, Pairs]:
+    """Return the candidate pairs (k, 2) of the scene's shapes (`shapes_of`), and those left out.
+
+    Pairs of links are left out that overlap at the start.
 
     The first shape of a pair is of a moving body. Bodies of one tree are paired only with
     ``contact.self_collisions``. Rigidly connected bodies and neighbours across one joint are never
-    paired, because they touch by construction. Nor are those that overlap at the start.
+    paired, because they touch by construction.
     """
     part = carriers(mechanism.arrays)
-    # the rigid part that carries the joint of its own; the world has none
+    # the rigid part that carries the joint of each one; -1 is the world, which has none (-2)
     beneath = np.append(part, -1)[mechanism.arrays.parent[part]]
     beneath[part < 0] = -2
     pairs = candidate_pairs(shapes)
@@ -256,11 +280,19 @@ def pairs_of(scene: Scene, mechanism: Mechanism, shapes: Shapes) -> tuple[Pairs,
     apart = (bodies < 0).any(axis=0) | (tree_a != tree_b)
     links = ~apart & ~adjoining & scene.contact.self_collisions
     overlapping = _overlapping_at_start(scene, mechanism, shapes, pairs[links])
-    owners = shape_names(scene)
-    named = sorted({f"{owners[a]} and {owners[b]}" for a, b in pairs[links][overlapping]})
+    left_out = pairs[links][overlapping]
     links[links] = ~overlapping
+    return pairs[apart | links], left_out
+
+
+def remarks_on(scene: Scene, left_out: Pairs) -> tuple[str, ...]:
+    """Return the scene's remarks, and one that names the links of pairs left out."""
+    if not len(left_out):
+        return scene.remarks
+    owners = shape_names(scene)
+    named = sorted({f"{owners[a]} and {owners[b]}" for a, b in left_out})
     said = f"{', '.join(named)} overlap at the start: links of one tree, they never touch"
-    return pairs[apart | links], (*scene.remarks, *((said,) * bool(named)))
+    return (*scene.remarks, said)
 
 
 def _overlapping_at_start(

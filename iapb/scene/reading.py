@@ -129,10 +129,11 @@ def scene_from_text(text: str, file: str = "(text)") -> Scene:
     try:
         scene = checked(scene_kind(given), given, document, added.mistakes)
         if fault := joint_fault(scene):
-            i, field, value, expected = fault
-            path = ("bodies", i, field)
-            name = written(path) if added.origins else f"{field} of {scene.bodies[i].name}"
-            raise SceneError([Mistake(file, *document.place(path), name, str(value), expected)])
+            path = ("bodies", fault.body, fault.field)
+            body = scene.bodies[fault.body].name
+            name = written(path) if added.origins else f"{fault.field} of {body}"
+            place = document.place(path)
+            raise SceneError([Mistake(file, *place, name, str(fault.value), fault.expected)])
     except SceneError as failure:
         raise SceneError(told(failure.mistakes, added, document)) from None
     if given is document.value:
