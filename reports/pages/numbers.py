@@ -81,8 +81,9 @@ def _of_numbers(form: Callable[..., str]) -> Callable[..., str]:
 
 @_of_numbers
 def num(value: float, digits: int = 2) -> str:
-    """Return a number with two digits: 32, 0.55, 1,300, 3 · 10⁻¹⁴; whole numbers keep all."""
-    return f"{value:,}" if isinstance(value, int) else format_number(value, digits)
+    """Return a number with two digits: 32, 0.55, 1,300, 3 · 10⁻¹⁴; counts keep all."""
+    count = abs(value) < 1e9 and value == int(value)
+    return f"{int(value):,}" if count else format_number(value, digits)
 
 
 @_of_numbers
