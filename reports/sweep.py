@@ -21,6 +21,7 @@ from iapb.scene import Scene, find_scene, load_scene, scene_names
 from iapb.scene.document import Document
 from iapb.scene.parts import Number, ScenePart, Text, Truth
 from iapb.scene.reading import checked, read_text
+from reference.worlds import find_world
 from reports.runner import Runner
 from reports.show import said
 from reports.store.io import write_whole
@@ -67,7 +68,7 @@ def load_study(path: Path) -> tuple[Study, Scene]:
     Raises
     ------
     ArgumentError
-        A file cannot be read, or the study has more than MAX_POINTS points.
+        A file cannot be read, a world does not exist, or there are more than MAX_POINTS points.
     SceneError
         A file is no study or no scene; the error lists all mistakes.
     """
@@ -76,6 +77,8 @@ def load_study(path: Path) -> tuple[Study, Scene]:
     size = math.prod(map(len, study.axes().values()))
     if size > MAX_POINTS:
         raise ArgumentError("study", f"{size} points", f"at most {MAX_POINTS}")
+    for world in study.worlds:
+        find_world(world)
     ours = study.scene in scene_names()
     return study, load_scene(find_scene(study.scene) if ours else path.parent / study.scene)
 
