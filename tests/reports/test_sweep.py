@@ -176,6 +176,7 @@ def test_a_worker_of_another_version_or_without_the_folder_says_so(tmp_path):
     ("old", "new", "said"),
     [
         ("worlds:", "worldsx:", "worldsx"),
+        ("[IAPB, PB]", "[IAPB, BP]", "BP"),
         ("[0, 1]", "[[0, 1]]", "contact.restitution"),
         ("[0, 1]", f"[{'0, ' * 30_000} 1]", "at most"),
         ("two_discs", "../two_discs.yaml", "scene"),
