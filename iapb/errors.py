@@ -154,7 +154,9 @@ EXTRAS = {
         ),
         "reference",
     ),
-    **dict.fromkeys(("sympy", "flint", "typer", "rich", "xarray", "h5netcdf"), "verify"),
+    **dict.fromkeys(
+        ("hypothesis", "sympy", "flint", "typer", "rich", "xarray", "h5netcdf"), "verify"
+    ),
     **dict.fromkeys(("matplotlib", "jinja2", "latex2mathml", "viser"), "report"),
 }
 

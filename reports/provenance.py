@@ -31,6 +31,7 @@ PEERS = (
     "quantecon",
     "sympy",
     "python-flint",
+    "hypothesis",
     "mujoco",
 )
 UNKNOWN = "unknown"

@@ -66,10 +66,16 @@ NEEDS = [
         "Run.save",
         "h5py",
     ),
+    (
+        "from verification import check_passivity; check_passivity(lambda M, J, v, e: v)",
+        "verification.check_passivity",
+        "hypothesis",
+    ),
     ("from iapb.__main__ import main; print(main())", "iapb: The command", "typer"),
 ]
 COMMANDS = {
     "inspect run.h5": ("h5py", "reference", "The command"),
+    "verify": ("hypothesis", "verify", "verification.check_passivity"),
     "reproduce": ("jinja2", "report", "The command"),
 }
 

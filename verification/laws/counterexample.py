@@ -125,12 +125,17 @@ class Hunt:
         answers = (answer_of(self.child, pickle.loads(call)) for call in earlier)
         return not any(isinstance(answer, ResolverFault) for answer in answers)
 
-    def smallest(self, drawn: Sequence[ImpactCase]) -> ImpactCase | None:
+    def smallest(
+        self,
+        drawn: Sequence[ImpactCase],
+        search: Callable[[Callable[[ImpactCase], bool]], ImpactCase | None],
+    ) -> ImpactCase | None:
         """Return a small impact that a fresh resolver fails; None if there is none without earlier
         calls."""
         for least in (NOTABLE, 0.0):
             fails = partial(self.breaks, least=least)
-            failing = [case for case in drawn if fails(case)]
+            found = search(fails)
+            failing = [case for case in (found, *drawn) if case is not None and fails(case)]
             if not failing:
                 continue
             smallest = shrink(min(failing, key=_size), fails)

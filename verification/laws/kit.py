@@ -6,12 +6,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
+from importlib.util import find_spec
 from inspect import signature
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from iapb.errors import ArgumentError
+from iapb.errors import ArgumentError, MissingDependencyError, installing
 from iapb.names import one_of
 from reference.one_thread import one_thread
 from verification.impacts import (
@@ -280,6 +281,7 @@ def check_passivity(
     laws: Sequence[str] | None = None,
     impacts: int = IMPACTS,
     seed: int = 0,
+    search: int = 200,
     bounds: Bounds | None = None,
     largest_condition: float | None = None,
     unequal_restitution: bool = False,
@@ -307,6 +309,8 @@ def check_passivity(
         `impacts.ADVERSE` elastic impacts on nearly equal rows come first, in addition. Other
         contracts: up to 6 coordinates and 6 contacts, no nearly dependent rows.
     seed : seed of the random numbers; the same seed gives the same impacts.
+    search : number of examples that hypothesis may try to find and shrink a counterexample (0 =
+        shrink a drawn one).
     bounds : tolerances; default: those of the contract, from `verification.laws.bounds`.
     largest_condition : largest κ(M) drawn; default: 1e8 (``equality``), 1e4 (``unilateral``), 1e2
         (``frictional``).
@@ -353,6 +357,7 @@ def check_passivity(
     if not 0.0 < call_limit < np.inf:
         raise ArgumentError("call_limit", call_limit, "seconds above 0")
     _refuse_signature(resolver, contract)
+    _find_hypothesis()
     terms = CONTRACTS[contract]
     bounds = terms.bounds if bounds is None else bounds
     condition = terms.largest_condition if largest_condition is None else largest_condition
@@ -365,7 +370,7 @@ def check_passivity(
         watched = Watched(child if own_process and child else resolver)
         trial = _Trial(watched, bounds, terms, int(impacts), seed, condition, chosen, verdicts)
         done = _try_all(trial, ends, progress)
-        hunts = _Hunts(trial, resolver, child, ends, progress)
+        hunts = _Hunts(trial, resolver, child, search, contract, ends, progress)
         found = tuple(_counterexamples(hunts))
         hints = tuple(_hints(hunts, found))
         watched.forget()
@@ -383,6 +388,17 @@ def check_passivity(
         contract,
         call_limit,
     )
+
+
+def _find_hypothesis() -> None:
+    """Refuse at once if hypothesis is missing; only the search for a small counterexample loads
+    it."""
+    try:
+        if find_spec("hypothesis") is not None:
+            return
+    except ModuleNotFoundError:
+        pass
+    raise MissingDependencyError("hypothesis", "verification.check_passivity", installing("verify"))
 
 
 def _refuse_signature(resolver: Resolver, contract: str) -> None:
@@ -526,6 +542,8 @@ class _Hunts(NamedTuple):
     trial: _Trial
     resolver: Resolver
     child: Child | None
+    search: int
+    contract: str
     ends: float
     progress: Callable[[int, int], None] | None
 
@@ -561,11 +579,20 @@ def _counterexamples(hunts: _Hunts) -> Iterator[Counterexample]:
 def _counterexample(
     broken: LawVerdict, drawn: tuple[ImpactCase, ...], fault: str, hunts: _Hunts
 ) -> Counterexample:
-    """Return the smallest counterexample that the drawn impacts give, shrunk."""
+    """Return the smallest counterexample that hypothesis or the drawn impacts give, shrunk."""
     if kind_of(fault) == HANGS:
         return Counterexample(drawn[0], broken.law, fault)
     hunt = hunts.begin(broken.law, fault)
-    case = hunt.smallest(drawn)
+    kind = "unequal" if broken.law in UNEQUAL_LAWS else hunts.contract
+
+    def search(fails: Callable[[ImpactCase], bool]) -> ImpactCase | None:
+        from verification.laws.strategies import search_counterexample  # brings hypothesis
+
+        examples = hunts.search
+        seed = hunts.trial.seed
+        return search_counterexample(fails, examples, seed, kind) if examples else None
+
+    case = hunt.smallest(drawn, search)
     earlier = tuple[bytes, ...]()
     later = None if case else hunt.after_calls(*broken.first_calls[bool(fault)])
     if later is not None:
@@ -584,7 +611,7 @@ def _hints(hunts: _Hunts, found: tuple[Counterexample, ...]) -> Iterator[str]:
     verdicts = hunts.trial.verdicts.values()
     broken = [verdict for verdict in verdicts if not verdict.passed]
     largest = max((verdict.largest for verdict in broken), default=0.0)
-    table = "KIT" if hunts.trial.contract is CONTRACTS["equality"] else "ONE_SIDED"
+    table = "KIT" if hunts.contract == "equality" else "ONE_SIDED"
     wider = 0.0
     cause = ""
     if broken and 0 < watched.changed == watched.rounded:

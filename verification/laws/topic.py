@@ -31,6 +31,7 @@ IN_SPACE = 40
 TRAJECTORY_STEPS = 300
 # for the search of a counterexample
 COUNTER_IMPACTS = 500
+SEARCH = 300
 CAUGHT = "fault caught"
 
 
@@ -49,12 +50,14 @@ def _row(law: str, count: LawCount, fault: str, caught: bool) -> Row:
 
 
 def _impact_law(study: Study, name: str) -> Row:
-    report = study.once("kit", lambda: check_passivity(resolve_impact, impacts=KIT_IMPACTS))
+    report = study.once(
+        "kit", lambda: check_passivity(resolve_impact, impacts=KIT_IMPACTS, search=0)
+    )
     verdict = report.verdict(name)
     fault = PLANTED_BUGS[name]
     if verdict.error is not None:
         raise verdict.error
-    broken = check_passivity(fault.make(), laws=[name], impacts=FAULT_IMPACTS)
+    broken = check_passivity(fault.make(), laws=[name], impacts=FAULT_IMPACTS, search=0)
     return _row(verdict.statement, verdict, fault.name, name in broken.broken_laws)
 
 
@@ -148,7 +151,7 @@ def restitution_per_contact() -> Row:
 
 def _found(title: str, resolver: Any, law: str, **how: Any) -> Row:
     """Return the smallest impact that the kit finds for a resolver that breaks the law."""
-    report = check_passivity(resolver, **how)
+    report = check_passivity(resolver, search=SEARCH, **how)
     case = report.counterexample
     if case is None or report.counterexample_law != law:
         raise IapbError(f"in {how['impacts']} random impacts the resolver breaks no law {law!r}")

@@ -22,7 +22,7 @@ from verification.laws.contracts import UNILATERAL_LAWS, distance_from_cone
 @pytest.mark.parametrize(("contract", "name"), PUSHING)
 def test_every_planted_bug_is_caught_by_its_law(contract: str, name: str) -> None:
     law, resolver = PUSHING[contract, name]
-    report = check_passivity(resolver, contract=contract, laws=[law], impacts=80)
+    report = check_passivity(resolver, contract=contract, laws=[law], impacts=80, search=0)
     assert report.broken_laws == (law,)
     with pytest.raises(AssertionError, match=law):
         exec(report.counterexample_test + f"\n\ntest_{law}()", {"resolver": resolver})
@@ -66,7 +66,7 @@ def test_the_engines_friction_keeps_what_holds_for_equalities() -> None:
         resolve_frictional_impact, contract="frictional", laws=kept, impacts=100
     ).passed
     report = check_passivity(
-        resolve_frictional_impact, contract="frictional", laws=broken, impacts=100
+        resolve_frictional_impact, contract="frictional", laws=broken, impacts=100, search=0
     )
     assert set(report.broken_laws) == set(broken)
 
@@ -74,7 +74,7 @@ def test_the_engines_friction_keeps_what_holds_for_equalities() -> None:
 def test_gains_in_real_arithmetic_are_graded() -> None:
     """The engine gains in no bit; a sound resolver by rounding; 1e-4 too much of the impulse is
     severe."""
-    exact = {"laws": ["exact_energy"], "impacts": 100}
+    exact = {"laws": ["exact_energy"], "impacts": 100, "search": 0}
     assert check_passivity(resolve_impact, **exact).passed
     assert check_passivity(
         partial(resolve_impact, method="poisson"), contract="unilateral", **exact
@@ -107,7 +107,9 @@ def test_what_would_judge_nothing_is_refused(options: dict[str, object], message
 
 
 def test_a_broken_report_raises_with_the_matrices_and_what_came_back() -> None:
-    report = check_passivity(sound_resolver, contract="unilateral", laws=["pushing"], impacts=30)
+    report = check_passivity(
+        sound_resolver, contract="unilateral", laws=["pushing"], impacts=30, search=30
+    )
     with pytest.raises(AssertionError) as caught:
         report.raise_if_broken()
     text = str(caught.value)
@@ -121,7 +123,9 @@ def test_a_broken_report_raises_with_the_matrices_and_what_came_back() -> None:
 
 
 def test_a_counterexample_with_friction_shrinks_to_one_contact() -> None:
-    report = check_passivity(no_friction, contract="frictional", laws=["sticking"], impacts=60)
+    report = check_passivity(
+        no_friction, contract="frictional", laws=["sticking"], impacts=60, search=60
+    )
     case = report.counterexample
     assert (
         case.contacts == 1

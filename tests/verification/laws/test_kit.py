@@ -27,7 +27,7 @@ from verification.laws.resolver import Resolver
 def test_every_planted_bug_is_caught_by_its_law(law: str) -> None:
     resolver = PLANTED_BUGS[law].make()
     laws = None if law == "arguments" else [law]
-    assert check_passivity(resolver, impacts=60, laws=laws).broken_laws == (law,)
+    assert check_passivity(resolver, impacts=60, search=0, laws=laws).broken_laws == (law,)
 
 
 @pytest.mark.parametrize("index", range(3))
@@ -58,7 +58,7 @@ def test_shrinking_ends_and_leaves_nothing_to_take(index: int) -> None:
 def test_a_resolver_that_gives_nothing_usable_fails_with_its_complaint(
     answer: Any, complaint: str
 ) -> None:
-    report = check_passivity(lambda M, J, v, e: answer(v), impacts=5)
+    report = check_passivity(lambda M, J, v, e: answer(v), impacts=5, search=0)
     assert (
         not report.passed
         and complaint in report.verdict("kinetic_energy").fault
@@ -73,6 +73,7 @@ def test_unequal_restitution_is_opt_in() -> None:
     report = check_passivity(
         each_contact_its_own_restitution,
         impacts=30,
+        search=60,
         unequal_restitution=True,
         laws=["unequal_kinetic_energy"],
     )
@@ -95,11 +96,13 @@ def test_with_unequal_restitution_rows_may_come_in_any_order() -> None:
         return np.asarray(np.linalg.solve(lower.T, returned + A @ nnls(A, -returned)[0]))
 
     how: dict[str, Any] = {"laws": ["unequal_row_order"], "unequal_restitution": True}
-    found = check_passivity(poisson_of_the_active_set, contract="unilateral", impacts=60, **how)
+    found = check_passivity(
+        poisson_of_the_active_set, contract="unilateral", impacts=60, search=0, **how
+    )
     assert found.broken_laws == ("unequal_row_order",), found
     poisson = partial(resolve_impact, method="poisson")
-    assert check_passivity(poisson, contract="unilateral", impacts=300, **how).passed
-    assert check_passivity(resolve_impact, impacts=100, **how).passed
+    assert check_passivity(poisson, contract="unilateral", impacts=300, search=0, **how).passed
+    assert check_passivity(resolve_impact, impacts=100, search=0, **how).passed
 
 
 def test_a_slow_resolver_ends_unfinished_and_not_passed() -> None:
@@ -124,7 +127,7 @@ def test_a_slow_resolver_ends_unfinished_and_not_passed() -> None:
 def test_every_pasted_test_fails_on_its_resolver_and_passes_on_a_sound_one(
     law: str, resolver: Resolver
 ) -> None:
-    report = check_passivity(resolver, impacts=30, laws=[law])
+    report = check_passivity(resolver, impacts=30, search=20, laws=[law])
     for text in (
         report.counterexample_test,
         as_test(report.verdict(law).worst_case, law, resolver=resolver),
@@ -140,7 +143,9 @@ def test_every_pasted_test_fails_on_its_resolver_and_passes_on_a_sound_one(
 
 def test_the_exact_law_sees_gains_that_no_double_can_hold() -> None:
     """Relative to KE⁻ they are above 1.8e308, which raised, or below 5e-324, which passed."""
-    report = check_passivity(lambda M, J, v, e: 1e300 * v, impacts=3, laws=["exact_energy"])
+    report = check_passivity(
+        lambda M, J, v, e: 1e300 * v, impacts=3, laws=["exact_energy"], search=20
+    )
     assert not report.passed and "the law itself raised" not in report
     case = ImpactCase(np.eye(2), np.zeros((0, 2)), np.array([1.0, 0.0]), 0.5, "x")
     exact = EXACT_LAWS["exact_energy"].check

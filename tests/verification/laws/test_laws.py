@@ -1,35 +1,33 @@
-"""Every law on random impacts: our resolver against the bounds it proves, up to κ(M) = 1e14."""
+"""Every law on impacts that hypothesis draws: our resolver against the bounds it proves, up to κ(M)
+= 1e14."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
 
 from iapb import resolve_impact
-from verification.impacts import ImpactCase, draw_case
+from verification.impacts import ImpactCase
 from verification.laws.bounds import FACTORED, KIT, LawCount, LawResidual
 from verification.laws.equality import LAWS
 from verification.laws.resolver import Resolver
+from verification.laws.strategies import impact_cases
 from verification.methods import damped, svd
 
 
-def drawn(impacts: int) -> list[ImpactCase]:
-    rng = np.random.default_rng(14)
-    return [draw_case(rng, largest_condition=1e14) for _ in range(impacts)]
-
-
 @pytest.mark.parametrize("law", LAWS)
-def test_the_default_method_keeps_its_proved_bounds(law: str) -> None:
-    for case in drawn(200):
-        residual = LAWS[law].check(case, resolve_impact, FACTORED)
-        assert residual is None or residual.passed, residual
+@given(case=impact_cases(largest_exponent=14))
+def test_the_default_method_keeps_its_proved_bounds(law: str, case: ImpactCase) -> None:
+    residual = LAWS[law].check(case, resolve_impact, FACTORED)
+    assert residual is None or residual.passed, residual
 
 
+@given(case=impact_cases(largest_exponent=14))
 @pytest.mark.parametrize("method", [damped, svd])
-def test_filters_of_the_family_are_passive(method: Resolver) -> None:
-    for case in drawn(200):
-        residual = LAWS["kinetic_energy"].check(case, method, KIT)
-        assert residual is not None and residual.passed, residual
+def test_filters_of_the_family_are_passive(method: Resolver, case: ImpactCase) -> None:
+    residual = LAWS["kinetic_energy"].check(case, method, KIT)
+    assert residual is not None and residual.passed, residual
 
 
 def test_an_unknown_residual_never_passes() -> None:
