@@ -57,8 +57,9 @@ class Results(NamedTuple):
     generalized_impulse: np.ndarray  # (n, d)
     impulses: np.ndarray  # (n, c)
     tangential: np.ndarray  # (n, c m)
-    # (n, 7) rank, status, energy change, its lower and its upper bound, clamp, share of friction
-    numbers: np.ndarray
+    numbers: (
+        np.ndarray
+    )  # (n, 7) rank, status, energy change, its lower and its upper bound, clamp, share of friction
 
 
 class ResolveWork(NamedTuple):
@@ -66,8 +67,9 @@ class ResolveWork(NamedTuple):
 
     coordinate_exponent: Annotated[Integers, "velocity"]  # s
     row_exponent: Annotated[Integers, "row"]  # r
-    # ratio of the caller's rows to the scaled rows, up to one common factor
-    size: Annotated[Floats, "row"]
+    size: Annotated[
+        Floats, "row"
+    ]  # ratio of the caller's rows to the scaled rows, up to one common factor
     length: Annotated[Floats, "row"]
     impact: ImpactWork  # scaled
     push: PushWork
