@@ -48,7 +48,7 @@ class Study(ScenePart):
     """A study file: a scene, worlds, and lists of values by path, such as ``contact.stiffness``."""
 
     scene: Word = Field(description="a scene of the project, or a file beside this one")
-    worlds: Values = ("IAPB",)
+    worlds: Annotated[tuple[Text, ...], Field(min_length=1)] = ("IAPB",)
     values: dict[Word, Values] = Field(description="value path: list of values")
 
     def axes(self) -> dict[str, tuple[Any, ...]]:

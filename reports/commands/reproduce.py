@@ -32,8 +32,6 @@ from reports.show import Answer, Json, stage_progress
 from reports.store.io import write_whole
 from verification.finding import REPRODUCED, Failure, Finding
 
-SHOWN_FAILURES = 20  # of a stage, in the last lines
-
 
 def reproduce(
     out: Annotated[
@@ -112,10 +110,8 @@ def _failure_lines(failed: Sequence[FailedCases]) -> Iterator[str]:
     if failed:
         yield f"\nNot computed: {counted(sum(len(one.failures) for one in failed), 'case')}. The next call tries again."
     for one in failed:
-        for failure in one.failures[:SHOWN_FAILURES]:
+        for failure in one.failures:
             yield f"  {one.stage}: {failure.case}: {failure.error}: {failure.reason}"
-        if len(one.failures) > SHOWN_FAILURES:
-            yield f"  {one.stage}: and {len(one.failures) - SHOWN_FAILURES} more"
         yield f"    tracebacks: {one.file}"
 
 

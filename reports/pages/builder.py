@@ -131,7 +131,7 @@ def build_report(
     }
     return link_across(
         {
-            page.file: environment.get_template(page.template).render(shared, page=page)
+            page.file: environment.get_template(f"{page.id}.html.j2").render(shared, page=page)
             for page in PAGES
         }
     )

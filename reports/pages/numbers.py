@@ -82,7 +82,7 @@ def _of_numbers(form: Callable[..., str]) -> Callable[..., str]:
 @_of_numbers
 def num(value: float, digits: int = 2) -> str:
     """Return a number with two digits: 32, 0.55, 1,300, 3 · 10⁻¹⁴; counts keep all."""
-    count = abs(value) < 1e9 and value == int(value)
+    count = -1e9 < value < 1e9 and value == int(value)
     return f"{int(value):,}" if count else format_number(value, digits)
 
 

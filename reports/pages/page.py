@@ -19,10 +19,6 @@ class Page:
         """Return the path of the page, relative to the folder of the report."""
         return FIRST_PAGE if self.id == "first" else f"report/{self.id}.html"
 
-    @property
-    def template(self) -> str:
-        return f"{self.id}.html.j2"
-
 
 PAGES: tuple[Page, ...] = (
     Page("first", "First page"),

@@ -35,14 +35,11 @@ def bits(value):
         return type(value), [
             (field.name, bits(getattr(value, field.name))) for field in dataclasses.fields(value)
         ]
-    parts = (
-        value.items()
-        if isinstance(value, dict)
-        else value
-        if isinstance(value, tuple | list)
-        else None
-    )
-    return type(value), value if parts is None else [bits(part) for part in parts]
+    if isinstance(value, dict):
+        value = list(value.items())
+    if isinstance(value, tuple | list):
+        return type(value), [bits(part) for part in value]
+    return type(value), value
 
 
 @pytest.mark.parametrize("name", scene_names())

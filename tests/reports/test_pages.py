@@ -87,10 +87,11 @@ def test_a_page_quotes_numbers_by_key_and_a_missing_one_is_an_error_or_says_not_
 
 
 def test_numbers_have_one_format():
-    assert [num(32.47), num(0.554), num(1296.0), num(3.04e-14), num(1e-9)] == [
+    assert [num(32.47), num(0.554), num(1296.3), num(1296.0), num(3e-14), num(1e-9)] == [
         "32",
         "0.55",
         "1,300",
+        "1,296",
         "3 · 10⁻¹⁴",
         "10⁻⁹",
     ]
