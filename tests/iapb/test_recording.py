@@ -6,12 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from iapb import recording
 from iapb.numerics.schema import quantities
-from iapb.recording import Recorder, chunk_steps
+from iapb.recording import Recorder
 from iapb.run import UNSOLVED, Run
 from iapb.scene import find_scene, load_scene
 from iapb.simulation import INTERRUPTED, Simulation, simulate
@@ -27,13 +25,6 @@ def assert_same(first: Run, second: Run) -> None:
     assert ours.keys() == theirs.keys()
     for name, values in ours.items():
         assert np.array_equal(values, theirs[name]), name
-
-
-@given(st.integers(0, 10_000_000), st.integers(1, 100_000))
-def test_chunks_go_forward_and_bound_time_and_memory(contacts, remaining):
-    steps = chunk_steps(contacts, remaining)
-    assert 1 <= steps <= min(remaining, 512)
-    assert steps == 1 or steps * contacts <= 200_000
 
 
 @pytest.mark.parametrize("bytes_of_record", [1.0, 1e5, 1e9])
