@@ -188,7 +188,7 @@ BOTH_ENDS = {  # of the cradle are struck in one step
     [
         ("newton_cradle", {}, "full"),
         ("newton_cradle", BOTH_ENDS, "full"),
-        ("two_link_arm_a", {}, "full"),
+        ("three_link_arm_elastic", {"duration": 0.5}, "full"),  # M of a moving arm
         ("peg_corner", {}, "scale"),  # to a device: shares of an impulse, as they are applied
     ],
 )

@@ -1,4 +1,4 @@
-"""Contacts of shapes against support functions; bits that order and place must not
+"""Contacts of shapes against support functions and coal; bits that order and place must not
 change."""
 
 from __future__ import annotations
@@ -141,6 +141,30 @@ def at_places(system: System, *places: list[float]) -> np.ndarray:
     for k, place in enumerate(places):
         q[k * size : k * size + len(place)] = place
     return q
+
+
+def test_boxes_in_space_overlap_as_coal_says() -> None:
+    """Depth of two boxes at random, where a face decides and where edges do."""
+    coal = pytest.importorskip("coal")
+    rng = np.random.default_rng(0)
+    compared = 0
+    for _ in range(100):
+        sizes = rng.uniform(0.5, 1.5, size=(2, 3)).tolist()
+        system = pair_of(*({"kind": "box", "size": size} for size in sizes))
+        step = rng.normal(scale=[0.4, 0.4, 0.4, 1.5, 1.5, 1.5] * 2)
+        q = system.mechanism.integrate(system.mechanism.neutral(), step)
+        gap = system.contacts_at(q).gap.min(initial=0.0)
+        result = coal.CollisionResult()
+        poses = map(coal.Transform3s, *system.mechanism.placements(q))
+        boxes = [
+            coal.CollisionObject(coal.Box(*size), pose)
+            for size, pose in zip(sizes, poses, strict=True)
+        ]
+        coal.collide(*boxes, coal.CollisionRequest(), result)
+        depth = result.getContact(0).penetration_depth if result.isCollision() else 0.0
+        compared += depth < 0.0
+        assert gap == pytest.approx(depth, abs=1e-6 + 0.05 * abs(depth))
+    assert compared > 25
 
 
 @pytest.mark.parametrize("name", EXACT)

@@ -13,7 +13,7 @@ from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling
 from iapb.scene import Scene, scene_from_text
 from iapb.scene.reading import scene_from_values
 from iapb.simulation import simulate
-from tests.given import data_of
+from tests.given import data_of, scene_with
 from verification.certificate import certify
 from verification.ordinary.touch import INERTIA, G, heights, toss_values, tossed
 
@@ -169,8 +169,7 @@ walls: [{name: wall, kind: half_plane, point: [0, 0], normal: [1, 0]}]
     assert (first > 0.0) == isinstance(coupling, NoCoupling)
 
 
-GIVEN = data_of(__file__, "boxes.yaml")
-BOXES = scene_from_values(GIVEN)
+BOXES = scene_with(data_of(__file__, "boxes.yaml"))
 
 
 @pytest.mark.parametrize("seed", [3, 17, 23, 33])
