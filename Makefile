@@ -51,7 +51,7 @@ reproduce: setup ## regenerate every figure, table and claim into out/report.htm
 	@$(BIN)/iapb reproduce $(if $(FULL),--full)
 
 .PHONY: verify
-verify: setup ## the laws at 1,000,000 impacts and 7,000 trajectories; half an hour of a core; Ctrl-C prints what was found
+verify: setup ## the laws at 100,000 impacts and 7,000 trajectories; half an hour of a core; Ctrl-C prints what was found
 	@$(BIN)/iapb verify-many --workers $(PYTEST_WORKERS)
 
 .PHONY: portable

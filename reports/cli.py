@@ -36,15 +36,14 @@ GROUPS: dict[str, dict[str, str]] = {
         "inspect": "Describe a run: scene, law, collisions, energy, effects, provenance and hashes.",
         "certify": "Judge every recorded impact exactly: energy gain, and whether impulses and "
         "velocities are consistent.",
-        "compare": "Compare worlds on SCENE: distances, energy, time, and IAPB's impacts with the LCP's.",
+        "compare": "Compare worlds on SCENE: distances, energy and time.",
         "store": "Check the run and table files below a folder, or simulate its runs again.",
     },
     "Verify": {
         "verify": "Test an impact resolver against every law; print the verdict, the worst case "
         "and a shrunk counterexample.",
         "port": "Search the motion of a hand that draws energy from a force law; draw the map of devices.",
-        "verify-many": "Test the laws on a million impacts and thousands of trajectories; Ctrl-C lists "
-        "what was found.",
+        "verify-many": "Test the laws on many impacts and trajectories; Ctrl-C lists what was found.",
         "verify-world": "Put a world to the laws of trajectories on random scenes.",
         "solvers": "Put problem files to every complementarity solver; or compare IAPB with complementarity.",
         "prove": "Check every machine-checked statement, or print the proof of one.",

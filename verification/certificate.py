@@ -9,7 +9,7 @@ other engines are judged in the same way.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from types import SimpleNamespace
@@ -301,33 +301,33 @@ def _pieces(run: Run, step: Integers) -> Iterator[Any]:
         offsets = offsets[: few + 1]
         last = first + max(len(offsets) - 1, 1)
         hits = np.searchsorted(step, (first, first + len(offsets) - 1))
-        columns = {
-            "contacts": (
-                slice(offsets[0], offsets[-1]),
-                ("body_a", "body_b", "point", "normal", "impulse"),
-            ),
-            "impacts": (
-                slice(*hits),
-                ("q", "v_minus", "v_plus", "impulse", "rows", "scale", "mass_digest"),
-            ),
-        }
-        tables: dict[str, Any] = {
-            table: SimpleNamespace(
-                **{name: np.asarray(getattr(getattr(run, table), name)[rows]) for name in names}
-            )
-            for table, (rows, names) in columns.items()
-        }
-        tables["contacts"].offsets = offsets - offsets[0]
-        tables["impacts"].step = step[slice(*hits)] - first
+        contacts = _columns(
+            run.contacts,
+            ("body_a", "body_b", "point", "normal", "impulse"),
+            slice(offsets[0], offsets[-1]),
+        )
+        contacts.offsets = offsets - offsets[0]
+        impacts = _columns(
+            run.impacts,
+            ("q", "v_minus", "v_plus", "impulse", "rows", "scale", "mass_digest"),
+            slice(*hits),
+        )
+        impacts.step = step[slice(*hits)] - first
         yield SimpleNamespace(
             law=run.law,
             law_settings=run.law_settings,
             scene_resolved=run.scene_resolved,
             impulse=run.impulse[first:last],
             before=int(hits[0]),
-            **tables,
+            contacts=contacts,
+            impacts=impacts,
         )
         first = last
+
+
+def _columns(table: Any, names: Sequence[str], rows: slice) -> SimpleNamespace:
+    """Return these rows of the named columns of a table."""
+    return SimpleNamespace(**{name: np.asarray(getattr(table, name)[rows]) for name in names})
 
 
 def _total(run: Any) -> float:
@@ -439,40 +439,38 @@ def _refuse_indefinite(masses: Floats, start: int) -> None:
 
 def _certificate(batches: Iterable[Batch]) -> Certificate:
     """Judge impacts in batches of M, v⁻, v⁺ and impulse."""
-    judged = [Judged(np.zeros(0, np.bool_), 0, 0)]
-    largest = 0.0
-    momentum = np.nan
-    first = -1
-    shown = ""
+    found = Certificate(0, 0, 0, 0, first_gain=-1, largest_gain=0.0, momentum=np.nan)
     for masses, before, after, recorded in batches:
-        done = sum(len(one.gained) for one in judged)
-        judged.append(_judged(masses, before, after))
-        for k in np.flatnonzero(judged[-1].gained).tolist():
+        judged = _judged(masses, before, after)
+        for k in np.flatnonzero(judged.gained).tolist():
             one = masses[k % len(masses)], before[k], after[k]
-            largest = max(largest, relative_energy_gain(*one))
-            if first < 0:
-                first = done + k
-                shown = _shown(*one)
+            largest = max(found.largest_gain, relative_energy_gain(*one))
+            found = replace(found, largest_gain=largest)
+            if found.first_gain < 0:
+                found = replace(found, first_gain=found.impacts + k, counterexample=_shown(*one))
+        found = replace(
+            found,
+            impacts=found.impacts + len(before),
+            gains=found.gains + int(judged.gained.sum()),
+            by_integers=found.by_integers + judged.by_integers,
+            checked=found.checked + judged.checked,
+        )
         if recorded is not None and len(before):
-            with np.errstate(over="ignore", invalid="ignore"):  # an overflow fails the certificate
-                change = after - before
-                size = _form(np.abs(masses), np.abs(change)) + np.abs(recorded).sum(axis=1)
-                missing = np.matmul(masses, change[:, :, None])[:, :, 0] - recorded
-                # a weak impact changes a fast body by few units in the last place
-                rounded = _EPSILON * _form(np.abs(masses), np.abs(after) * (change != 0.0))
-                error = np.maximum(np.abs(missing).sum(axis=1) - rounded, 0.0)
-            momentum = float(np.fmax(momentum, _largest_share(error, size)))
-    gained = np.concatenate([one.gained for one in judged])
-    return Certificate(
-        len(gained),
-        int(gained.sum()),
-        sum(one.by_integers for one in judged),
-        sum(one.checked for one in judged),
-        first,
-        largest,
-        momentum,
-        counterexample=shown,
-    )
+            off = _momentum(masses, before, after, recorded)
+            found = replace(found, momentum=float(np.fmax(found.momentum, off)))
+    return found
+
+
+def _momentum(masses: Floats, before: Floats, after: Floats, recorded: Floats) -> float:
+    """Return `Certificate.momentum` of a batch."""
+    with np.errstate(over="ignore", invalid="ignore"):  # an overflow fails the certificate
+        change = after - before
+        size = _form(np.abs(masses), np.abs(change)) + np.abs(recorded).sum(axis=1)
+        missing = np.matmul(masses, change[:, :, None])[:, :, 0] - recorded
+        # a weak impact changes a fast body by few units in the last place
+        rounded = _EPSILON * _form(np.abs(masses), np.abs(after) * (change != 0.0))
+        error = np.maximum(np.abs(missing).sum(axis=1) - rounded, 0.0)
+    return _largest_share(error, size)
 
 
 def _form(masses: Floats, vectors: Floats) -> Floats:

@@ -237,6 +237,15 @@ class Check:
         return (Part("", verdict, self.question, held, decided, unknown, timed=timed),)
 
 
+def no_row_fails(name: str) -> Callable[[Table], tuple[Part, ...]]:
+    """Return the targets of a check that has one: `name`, the number of rows that fail, is 0."""
+
+    def targets(table: Table) -> tuple[Part, ...]:
+        return (Part.on(name, table.holds.count(False), 0),)
+
+    return targets
+
+
 def proved(part: Part, statement: str) -> Part:
     """Return a part by DESIGN: it holds if the statement is proved, unless a trial contradicts."""
     holds = part.held == part.decided and check_proof(statement).holds

@@ -38,11 +38,6 @@ class Times:
     samples: tuple[float, ...] = ()
 
     @property
-    def least(self) -> float:
-        """Smallest sample."""
-        return self.quantile(0.0)
-
-    @property
     def lower(self) -> float:
         """Lower quartile."""
         return self.quantile(0.25)
@@ -56,11 +51,6 @@ class Times:
     def upper(self) -> float:
         """Upper quartile."""
         return self.quantile(0.75)
-
-    @property
-    def largest(self) -> float:
-        """Largest sample."""
-        return self.quantile(1.0)
 
     def quantile(self, share: float) -> float:
         """Return the quantile of the samples at `share` in [0, 1], interpolated."""

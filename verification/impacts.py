@@ -46,8 +46,6 @@ class ImpactCase:
     tangents, friction : (c, m, d) rows of m tangents per contact, and (c,) Coulomb's μ; give both
         or neither.
     rank : the first `rank` rows are independent; the others depend on them.
-    mass_condition, closeness : κ(M), and the distance between nearly dependent rows (1 = generic),
-        as generated.
     """
 
     mass_matrix: Floats
@@ -61,8 +59,6 @@ class ImpactCase:
     tangents: Floats | None = None
     friction: Floats | None = None
     rank: int | None = None
-    mass_condition: float = np.nan
-    closeness: float = np.nan
 
     @property
     def arrays(self) -> tuple[Any, Any, Any]:
@@ -87,11 +83,6 @@ class ImpactCase:
             if self.contacts
             else 0
         )
-
-    @property
-    def label(self) -> str:
-        """Short name for tables."""
-        return f"d={self.coordinates} c={self.contacts} κ(M)={self.mass_condition:.0e} rows {self.closeness:.0e} apart"
 
     @cached_property
     def truth(self) -> tuple[Fraction, ...]:
@@ -589,19 +580,12 @@ def _bodies(rng: np.random.Generator, kind: str) -> tuple[Floats, Floats, Floats
     count = int(rng.integers(1, 4))
     angles = rng.uniform(0.0, 2.0 * np.pi, size=count)
     arms = rng.uniform(-0.5, 0.5, size=(2, count, 2))
-    axes = [
+    normals, tangents = (
         np.column_stack([np.cos(turned), np.sin(turned)])
         for turned in (angles + 0.5 * np.pi, angles)
-    ]
+    )
     one, other = (
-        np.stack(
-            [
-                np.column_stack([axis, arm[:, 0] * axis[:, 1] - arm[:, 1] * axis[:, 0]])
-                for axis in axes
-            ],
-            1,
-        )
-        for arm in arms
+        np.stack([_planar_rows(normals, arm), _planar_rows(tangents, arm)], axis=1) for arm in arms
     )
     if kind == "rod in the plane":  # steep friction can jam it
         return np.diag([1.0, 1.0, 0.1 * inertia[0]]), one, None
@@ -614,6 +598,12 @@ def _bodies(rng: np.random.Generator, kind: str) -> tuple[Floats, Floats, Floats
         np.concatenate([one, -other], axis=2),
         np.array([[1.0, 0, 0, 1, 0, 0], [0, 1.0, 0, 0, 1, 0]]),
     )
+
+
+def _planar_rows(axes: Floats, arms: Floats) -> Floats:
+    """Return the rows (c, 3) of forces along axes (c, 2) that act at arms (c, 2)."""
+    moments = arms[:, 0] * axes[:, 1] - arms[:, 1] * axes[:, 0]
+    return np.column_stack([axes, moments])
 
 
 # Impacts for the algebraic claims: mass matrices of given condition, rows of given rank. Rows are
@@ -690,18 +680,15 @@ TIMED_HARDNESS = tuple(
 )
 
 
-def timed_problems(contacts: int, coordinates: int, seed: int = 0) -> tuple[ImpactCase, ...]:
-    """Return nine impacts of one size: three condition numbers of M times three closenesses of the
-    rows.
+def timed_problem(contacts: int, coordinates: int, number: int, seed: int = 0) -> ImpactCase:
+    """Return one of nine impacts of a size: three condition numbers of M times three closenesses of
+    the rows.
 
     The restitution takes the values 0, 1/2 and 1 in turn.
     """
-    return tuple(
-        _timed_problem(
-            coordinates, contacts, condition, closeness, (0.0, 0.5, 1.0)[(k + k // 3) % 3], seed
-        )
-        for k, (condition, closeness) in enumerate(TIMED_HARDNESS)
-    )
+    condition, closeness = TIMED_HARDNESS[number]
+    e = (0.0, 0.5, 1.0)[(number + number // 3) % 3]
+    return _timed_problem(coordinates, contacts, condition, closeness, e, seed)
 
 
 def _timed_problem(
@@ -709,15 +696,8 @@ def _timed_problem(
 ) -> ImpactCase:
     rng = np.random.default_rng([seed, d, c, int(np.log10(condition)), int(-np.log10(closeness))])
     mass = with_spectrum(rng, condition ** -np.linspace(0.0, 1.0, d))
-    case = ImpactCase(
-        mass,
-        _near_rows(rng, d, c, closeness),
-        np.zeros(d),
-        e,
-        "timed",
-        mass_condition=condition,
-        closeness=closeness,
-    )
+    name = f"d={d} c={c} κ(M)={condition:.0e} rows {closeness:.0e} apart"
+    case = ImpactCase(mass, _near_rows(rng, d, c, closeness), np.zeros(d), e, name)
     whitened = case.rows
     length = np.linalg.norm(case.rows, axis=1)
     approach = -whitened.T @ (rng.uniform(0.2, 1.0, size=c) / np.where(length > 0.0, length, 1.0))
@@ -747,49 +727,6 @@ def _near_rows(rng: np.random.Generator, d: int, c: int, closeness: float) -> Fl
             size=(c - half, d)
         )
     return base
-
-
-# Inputs of any size, for the promise that every finite input gives a finite motion or an error by
-# name.
-EXTREME_SIZES = (5e-324, 1e-310, 1e-160, 1e-30, 1.0, 1e30, 1e160, 1.7e308)
-EXTREME_MASSES = ("spectral", "graded", "singular", "indefinite", "asymmetric", "zero")
-EXTREME_ROWS = ("generic", "dependent", "scaled", "copies", "none", "zeros", "huge")
-
-
-def draw_extreme_case(rng: np.random.Generator) -> ImpactCase:
-    """Return M, J and v with magnitudes between the smallest and the largest double; M is not
-    always a mass matrix."""
-    d = int(rng.integers(1, 7))
-    kind = str(rng.choice(EXTREME_MASSES))
-    rows_kind = str(rng.choice(EXTREME_ROWS))
-    mass = draw_mass_matrix(
-        rng, "graded" if kind == "graded" else "spectral", d, 10.0 ** rng.uniform(0.0, 18.0)
-    )
-    if kind == "singular":
-        mass = np.outer(mass[0], mass[0])
-    if kind == "indefinite":
-        mass = mass - 2.0 * np.diag(mass)[rng.integers(d)] * np.eye(d)
-    if kind == "asymmetric":
-        mass = mass + np.triu(rng.normal(size=(d, d)), 1)
-    mass = np.zeros((d, d)) if kind == "zero" else mass
-    rows = draw_rows(rng, "generic" if rows_kind == "huge" else rows_kind, np.eye(d))[0]
-    with np.errstate(over="ignore", under="ignore"):
-        mass, rows, v = (_sized(rng, array) for array in (mass, rows, rng.normal(size=d)))
-    e = float(rng.choice([-1.0, 0.0, 1.0, 0.3]))
-    return ImpactCase(mass, rows, v, e, f"{kind} mass, {rows_kind} rows, extreme sizes")
-
-
-def _sized(rng: np.random.Generator, array: Floats) -> Floats:
-    """Scale the array by one magnitude, or each entry by its own (symmetric for a square array);
-    keep it finite."""
-    sizes = (
-        rng.choice(EXTREME_SIZES, size=array.shape)
-        if rng.random() < 0.2
-        else float(rng.choice(EXTREME_SIZES))
-    )
-    if isinstance(sizes, np.ndarray) and array.ndim == 2 and array.shape[0] == array.shape[1]:
-        sizes = np.maximum(sizes, sizes.T)
-    return np.asarray(np.clip(array * sizes, -1.7e308, 1.7e308))
 
 
 # Many impacts of one size, for compiled resolvers: families in which rounding gains most, an

@@ -145,46 +145,24 @@ def titled(
     rows: Iterable[Sequence[Any]] = (),
     digits: int = 3,
     note: str = "",
-    timed: Collection[str] = (),
-    timed_rows: bool = False,
-    prose: Collection[str] = (),
-) -> Table:
-    """Return a table from titles such as "step [ms]": the brackets hold the unit; the rest is the
-    key.
-
-    `timed` and `prose` list the titles of the timed columns and of the columns of sentences.
-    """
-    for kind, names in (("timed", timed), ("prose", prose)):
-        if unknown := [name for name in names if name not in titles]:
-            raise ValueError(f"{kind} columns {unknown}: expected some of {tuple(titles)}")
-    columns = tuple(column_of(title, timed=timed, prose=prose) for title in titles)
-    return Table(columns, tuple(tuple(row) for row in rows), (), digits, note, timed_rows)
-
-
-def table_from(
-    rows: Iterable[Row],
-    digits: int = 3,
-    note: str = "",
     timed_rows: bool = False,
     **marks: Collection[str],
 ) -> Table:
+    """Return a table from titles such as "step [ms]": the brackets hold the unit; the rest is the
+    key. `marks` are those of `column_of`."""
+    columns = tuple(column_of(title, **marks) for title in titles)
+    return Table(columns, tuple(tuple(row) for row in rows), (), digits, note, timed_rows)
+
+
+def table_from(rows: Iterable[Row], **more: Any) -> Table:
     """Return a table of dictionaries whose keys carry the unit; they are the columns, in the order
     of appearance.
 
-    A row without a value has None in its place. `marks` are those of `column_of`.
+    A row without a value has None in its place. `more` are other arguments of `titled`.
     """
     given = list(rows)
-    titles = [
-        title for title in dict.fromkeys(title for row in given for title in row) if title != HOLDS
-    ]
-    return Table(
-        tuple(column_of(title, **marks) for title in titles),
-        tuple(tuple(row.get(title) for title in titles) for row in given),
-        (),
-        digits,
-        note,
-        timed_rows,
-    )
+    titles = dict.fromkeys(title for row in given for title in row if title != HOLDS)
+    return titled(tuple(titles), ([row.get(title) for title in titles] for row in given), **more)
 
 
 def column_of(title: str, **marks: Collection[str]) -> Column:

@@ -15,14 +15,11 @@ of its own pose.
 
 The reference world runs a second time at half its step; the difference is its own error. Worlds
 whose distances differ by less are not ordered.
-
-The impacts of IAPB are then compared with the velocities of the frictionless LCP.
 """
 
 from __future__ import annotations
 
 import time
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
@@ -41,15 +38,10 @@ from iapb.scene import Scene, find_scene, load_scene
 from iapb.scene.mechanism import mechanism_of
 from iapb.simulation import INTERRUPTED
 from reference import Floats
-from reference.complementarity.laws import newton_lcp
 from reference.mujoco import MuJoCo
 from reference.worlds import WORLDS, run_world
-from verification.complementarity.agreement import PUSHED, SAME, distances
-from verification.complementarity.of_runs import StruckImpact, problems_of_run
 from verification.finding import (
-    BEYOND,
     MIXED,
-    NOT_TESTABLE,
     REPRODUCED,
     Failure,
     Finding,
@@ -57,7 +49,7 @@ from verification.finding import (
     attempt,
     finding_of,
 )
-from verification.scenes.books import risen, work_given
+from verification.scenes.books import risen
 from verification.table import Row, table_from
 
 Progress = Callable[[str, int, int], None]
@@ -67,13 +59,11 @@ Series = dict[
 ]  # arrays of quantities over time, by their column; None where a run does not record them
 
 INSTANTS = 1000  # largest number of instants at which worlds are compared
-IMPACTS = 200  # largest number of impacts of IAPB that are compared with the LCP's
 QUESTION = (
     "The scene is simulated in each world. Distances from the reference world are in the kinetic "
     "metric, for the whole "
     "mass: root mean square displacement and velocity of its particles, and the impulse of all "
-    "contacts so far. "
-    "The impacts of IAPB are then compared with the velocities of the frictionless LCP."
+    "contacts so far."
 )
 _UNITS = {"configuration": "m", "velocity": "m/s", "impulse": "N s"}  # of the three distances
 
@@ -121,8 +111,8 @@ def compare_worlds(
     Returns
     -------
     Finding
-        Its tables are "worlds" (one row per world) and "over time". If IAPB is one of the worlds,
-        the answer begins with its impacts beside the LCP's. Then it names the closest of the worlds
+        Its tables are "worlds" (one row per world) and "over time". The answer names the closest
+        of the worlds
         whose runs are complete and trustworthy, unless they differ by less than the reference's own
         error (the difference from itself at half its step), and the others with the reason.
 
@@ -168,8 +158,7 @@ def compare_worlds(
                 _world(name, ran, own if name == against else series[name], fastest)
                 for name, ran in runs.items()
             ],
-            3,
-            f"Distances from {against}, in the kinetic metric for the whole mass, at {INSTANTS} "
+            note=f"Distances from {against}, in the kinetic metric for the whole mass, at {INSTANTS} "
             f"instants at most. In its own row: from itself at half its step. "
             f"Impulse: {impulse}. Lost: start and work done, minus the end. The time is the "
             f"processor's, without "
@@ -177,9 +166,7 @@ def compare_worlds(
             timed=("time per step", "times the fastest"),
         ),
         "over time": table_from(
-            {"world": name, **dict(zip(found, row, strict=True))}
-            for name, found in series.items()
-            for row in _rows_of(found)
+            row for name, found in series.items() for row in _rows_of(name, found)
         ),
     }
     fit = len(runs) - len(unfit)
@@ -188,12 +175,6 @@ def compare_worlds(
     )
     said += "".join(f"; {name} {why}" for name, why in unfit.items())
     parts = [Part(f"{said}.", MIXED if unfit else REPRODUCED, "runs", fit, len(runs))]
-    headline: list[str] = []
-    if "IAPB" in runs:
-        judging = partial(compare_impacts, runs["IAPB"][0], scene, failures)
-        if judged := attempt("impacts", judging, failures):
-            parts.append(judged)
-            headline.append(judged.sentence)
     finding = finding_of(
         f"worlds of {scene.name}",
         scene.title or scene.name,
@@ -201,13 +182,12 @@ def compare_worlds(
         parts,
         tables,
         failures,
-        " ".join([*headline, _answer(runs, series, own, against, unfit)]),
+        _answer(series, own, against, unfit),
     )
     return replace(
         finding,
         details={
             "scene": scene.name,
-            "worlds": ", ".join(runs),
             "against": against,
             "impulse": impulse,
         },
@@ -291,11 +271,13 @@ def _series(mechanism: Mechanism, run: Run, reference: Run, every: int = 1) -> S
     }
 
 
-def _rows_of(found: Series) -> Iterator[tuple[float | None, ...]]:
-    """Yield the values at each instant."""
-    count = len(found["time [s]"])
-    columns = ([None] * count if values is None else values.tolist() for values in found.values())
-    yield from zip(*columns, strict=True)
+def _rows_of(world: str, found: Series) -> Iterator[Row]:
+    """Yield the row of each instant."""
+    for k in range(len(found["time [s]"])):
+        cells = {
+            title: None if values is None else float(values[k]) for title, values in found.items()
+        }
+        yield {"world": world} | cells
 
 
 def _given(run: Run) -> Floats:
@@ -312,15 +294,8 @@ def _world(name: str, ran: Ran, apart: Series | None, fastest: float) -> Row:
         values = None if apart is None else apart[f"{key} [{unit}]"]
         for which in ("rms", "most", "end"):
             far[f"{key}, {which} [{unit}]"] = None if values is None else _sizes(values)[which]
-    books: dict[str, float | None] = dict.fromkeys(
-        ("work done [J]", "energy lost [J]", "most above start and work [J]")
-    )
-    if (
-        run.coupling != "unilateral"
-    ):  # that coupler moves the tool at times, so there is no energy balance
-        work = float(work_given(run)[-1])
-        above = risen(run)
-        books = dict(zip(books, (work, 0.0 - float(above[-1]), float(above.max())), strict=True))
+    # a unilateral coupler moves the tool at times, so there is no energy balance
+    above = None if run.coupling == "unilateral" else risen(run)
     touching = run.records_contacts
     return {
         "world": name,
@@ -328,8 +303,8 @@ def _world(name: str, ran: Ran, apart: Series | None, fastest: float) -> Row:
         "ignores": ", ".join(ignored_fields(run.effects)) or None,
         "simulated until [s]": float(run.time[-1]),
         **far,
-        "kinetic energy at the end [J]": float(run.energy["kinetic"][-1]),
-        **books,
+        "energy lost [J]": None if above is None else 0.0 - float(above[-1]),
+        "most above start and work [J]": None if above is None else float(above.max()),
         "deepest overlap [mm]": 1e3 * max(0.0, -float(run.contacts.gap.min(initial=0.0)))
         if touching
         else None,
@@ -359,7 +334,6 @@ def _unfit(scene: Scene, run: Run) -> str:
 
 
 def _answer(
-    runs: dict[str, Ran],
     series: dict[str, Series],
     own: Series | None,
     against: str,
@@ -379,15 +353,10 @@ def _answer(
         for name, found in series.items()
         if name != against and name not in unfit
     }
-    left_out = (
-        f" Not ranked: {'; '.join(f'{name} {why}' for name, why in unfit.items())}."
-        if unfit
-        else ""
-    )
     if not far:
-        return f"No world can be compared with {against}.{left_out}"
+        return f"No world can be compared with {against}."
     if own is None:
-        return f"No order of the worlds: {against} fails at half its step.{left_out}"
+        return f"No order of the worlds: {against} fails at half its step."
     error = _sizes(own["configuration [m]"])["rms"]
     known = f"{against} itself moves by {1e3 * error:.3g} mm at half its step."
     closest = min(far, key=lambda name: far[name]["rms"])
@@ -397,44 +366,10 @@ def _answer(
         each = ", ".join(f"{name} {1e3 * far[name]['rms']:.3g}" for name in equal)
         return (
             f"Equally close to {against}: {each} mm apart (rms over mass and time), as far "
-            f"as it can tell: {known}{left_out}"
+            f"as it can tell: {known}"
         )
-    ratio = runs[against][1] / runs[closest][1]
-    speed = f"{ratio:.3g} times as fast" if ratio >= 1.0 else f"{1.0 / ratio:.3g} times as slow"
     return (
         f"Closest to {against} is {closest}: {1e3 * nearest:.3g} mm apart (rms over "
         f"mass and time), "
-        f"{1e3 * far[closest]['most']:.3g} mm at most; its step is {speed}. {known}{left_out}"
+        f"{1e3 * far[closest]['most']:.3g} mm at most. {known}"
     )
-
-
-def compare_impacts(run: Run, scene: Scene, failures: list[Failure]) -> Part | None:
-    """Return the part on IAPB's velocities and those of the LCP, which are equal if all contacts
-    push; None without an impact."""
-    struck = problems_of_run(run, scene)
-    if not struck:
-        return None
-    alike = [one for one in struck if not one.other_law][:IMPACTS]
-    pairs = [attempt(one.problem.name, partial(_apart, one), failures) for one in alike]
-    compared = [pair for pair in pairs if pair is not None]
-    left_out = Counter(one.other_law for one in struck if one.other_law)
-    besides = "".join(f" Not compared: {many} with {why}." for why, many in left_out.items())
-    if unequal := sum(np.ptp(one.problem.restitution) > 0.0 for one in alike):
-        besides = f" In {unequal} contacts differ in e: there IAPB uses Poisson's law.{besides}"
-    if not compared:
-        said = f"No impact of IAPB is compared with the LCP.{besides}"
-        return Part(said, NOT_TESTABLE, "motion", role=BEYOND)
-    agree = sum(distance <= SAME for distance, _ in compared)
-    pulled = sum(outside > PUSHED for _, outside in compared)
-    said = (
-        f"IAPB moves as the LCP in {agree} of {len(compared)} impacts; in {pulled} an impulse "
-        f"pulls; largest distance {max(compared)[0]:.2g} |v⁻|.{besides}"
-    )
-    verdict = REPRODUCED if agree == len(compared) else MIXED
-    return Part(said, verdict, "motion", agree, len(compared))
-
-
-def _apart(one: StruckImpact) -> tuple[float, float]:
-    """Return the distances of IAPB's answer from the LCP's velocity, and from impulses that
-    push."""
-    return distances(one.problem, one.velocity, newton_lcp(one.problem).velocity)

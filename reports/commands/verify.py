@@ -14,7 +14,7 @@ from verification.laws.kit import CALL_LIMIT, IMPACTS
 
 ENGINE = "iapb:resolve_impact"
 # with --json
-LAW_FIELDS = ("law", "statement", "checked", "failures", "severe", "largest", "fault")
+LAW_FIELDS = ("law", "statement", "checked", "failures", "largest", "fault")
 
 
 def verify(

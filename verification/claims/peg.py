@@ -35,7 +35,6 @@ from verification.scenes.measures import (
     deepest_penetration,
     device_overlap,
     force_distance,
-    largest_separation,
     peak_force,
     root_mean_square,
     separation_by_impacts,
@@ -500,13 +499,11 @@ def _separation(study: Study, condition: Condition) -> Iterator[Row]:
     for rendering in RENDERINGS:
         run = trace(study, condition, "IAPB", rendering)
         (x, y, theta) = separation_by_impacts(run)
-        whole = largest_separation(run)
         yield {
             "rendering": rendering,
             **condition.row(*LIMITED),
             "distance [m]": float(max(x, y)),
             "angle [rad]": float(theta),
-            "distance in the run [m]": float(max(whole[:2])),
             "impacts limited": limited,
         }
 

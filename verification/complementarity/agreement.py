@@ -23,7 +23,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from itertools import product
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -31,12 +31,12 @@ from iapb import resolve_impact
 from iapb.scene import scene_names
 from reference.complementarity.laws import newton_lcp, unpushed_share
 from reference.complementarity.problem import ImpactProblem
-from verification.check import Check, Study
+from verification.check import Check, Study, no_row_fails
 from verification.complementarity.families import FAMILIES, random_cases, two_contacts
 from verification.complementarity.of_runs import scene_impacts
 from verification.complementarity.piles import sphere_piles
 from verification.finding import Failure, Part, attempt
-from verification.impacts import ImpactCase
+from verification.impacts import Floats, ImpactCase
 from verification.table import Row, Table
 
 # Two velocities count as equal below this distance (kinetic metric, relative to |v⁻|), which is
@@ -60,10 +60,8 @@ def compare_case(case: ImpactCase) -> dict[str, Any]:
     Returns
     -------
     dict
-        distance : |v⁺ − v⁺_LCP|; cone distance : distance of the impulse from {Jᵀp : p >= 0}; both
-            in the kinetic
-        metric, relative to |v⁻|.  agrees : whether the velocities are equal; pushes : whether some
-        p >= 0 gives v⁺;
+        distance : |v⁺ − v⁺_LCP| in the kinetic metric, relative to |v⁻|.  agrees : whether the
+        velocities are equal; pushes : whether some p >= 0 gives v⁺;
         contradicts : whether one holds without the other, which statement 1 excludes.
         extra loss : loss of kinetic energy beyond that of the LCP, as a share of KE⁻.
         defect : largest error of statements 1 and 3.
@@ -81,7 +79,6 @@ def compare_case(case: ImpactCase) -> dict[str, Any]:
     law = newton_lcp(problem).velocity
     upper = case.lower.T
     e = case.restitution
-    before = upper @ case.velocity
     change = upper @ (v - case.velocity)
     scale = float(np.abs(problem.gamma_minus).max(initial=0.0)) or 1.0
     rows = (
@@ -89,13 +86,14 @@ def compare_case(case: ImpactCase) -> dict[str, Any]:
         if case.touching is None
         else np.vstack([case.contact_jacobian, case.touching])
     )
-    distance, cone = distances(problem, v, law)
-    extra = _lost(before, change) - _lost(before, upper @ (law - case.velocity))
+    distance = case.distance(v, law)
+    pulled = unpushed_share(case.rows.T, change) * float(np.linalg.norm(change))
+    cone = pulled / (case.speed or 1.0)
+    extra = _lost(case.u, change) - _lost(case.u, upper @ (law - case.velocity))
     near, far = sorted((distance, cone))
     return {
         "impacts": case.family,
         "distance": distance,
-        "cone distance": cone,
         "agrees": distance <= SAME,
         "pushes": cone <= PUSHED,
         "contradicts": near <= SAME and far > PUSHED,
@@ -103,31 +101,17 @@ def compare_case(case: ImpactCase) -> dict[str, Any]:
         "defect": max(abs(distance - cone), abs(extra - (1.0 - e) / (1.0 + e) * distance**2)),
         "approaching": bool(np.any(rows @ v < -APPROACHING * scale)),
         "approaching by the LCP": bool(np.any(rows @ law < -APPROACHING * scale)),
-        "outside": _outside(problem.factor, change),
+        "outside": _outside(case.rows, change),
     }
 
 
-def distances(problem: ImpactProblem, velocity: np.ndarray, law: np.ndarray) -> tuple[float, float]:
-    """Return how far v⁺ (d,) is from the law's, and its impulse from {Jᵀp : p >= 0}.
-
-    Both are in the kinetic metric, relative to |v⁻|.
-    """
-    upper = np.linalg.cholesky(cast(np.ndarray, problem.mass_matrix)).T
-    before = upper @ cast(np.ndarray, problem.velocity)
-    change = upper @ velocity - before
-    speed = float(np.linalg.norm(before)) or 1.0
-    apart = float(np.linalg.norm(upper @ (velocity - law)))
-    pulled = unpushed_share(problem.factor.T, change) * float(np.linalg.norm(change))
-    return apart / speed, pulled / speed
-
-
-def _lost(before: np.ndarray, change: np.ndarray) -> float:
+def _lost(before: Floats, change: Floats) -> float:
     """Return (KE⁻ − KE⁺) / KE⁻, computed from the change of velocity to avoid cancellation."""
     energy = 0.5 * float(before @ before)
     return -float(before @ change + 0.5 * change @ change) / energy if energy > 0.0 else 0.0
 
 
-def _outside(rows: np.ndarray, change: np.ndarray) -> float:
+def _outside(rows: Floats, change: Floats) -> float:
     size = float(np.linalg.norm(change))
     if size == 0.0 or not len(rows):
         return 0.0 if size == 0.0 else 1.0
@@ -238,15 +222,11 @@ def _two_contacts(study: Study, point: tuple[float, float, ImpactCase]) -> Row:
     }
 
 
-def _grid_targets(table: Table) -> Iterator[Part]:
-    yield Part.on("points of the map that contradict r >= c", table.holds.count(False), 0)
-
-
 TWO_CONTACTS = Check(
     key="two contacts",
     question="Do the laws agree at two contacts exactly where r >= c?",
     cases=_grid,
     row=_two_contacts,
     holds=lambda row: row["agreement predicted"] == row["agreement found"],
-    targets=_grid_targets,
+    targets=no_row_fails("points of the map that contradict r >= c"),
 )

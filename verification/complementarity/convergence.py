@@ -13,7 +13,6 @@ this study uses them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -25,9 +24,8 @@ from iapb.simulation import simulate
 from reference.scene_events import SceneTruth, scene_truth
 from reference.time_stepping import RigidConstraints
 from reference.worlds import find_world
-from verification.check import Check
-from verification.finding import Part
-from verification.table import HOLDS, Table
+from verification.check import Check, no_row_fails
+from verification.table import HOLDS
 
 TRUTH_SCENES = {
     path.stem: path for path in sorted((Path(__file__).parent / "scenes").glob("*.yaml"))
@@ -194,15 +192,10 @@ QUICK = (
 )  # the scenes of the quick depth
 
 
-def _targets(table: Table) -> Iterator[Part]:
-    late = table.holds.count(False)
-    yield Part.on("scenes in which the rigid world does not converge", late, 0)
-
-
 CONVERGENCE = Check(
     key="convergence",
     question="Does the rigid world converge to the event-driven solution, at least at first order?",
     cases=lambda study: [case for case in CASES if study.depth == "full" or case.scene in QUICK],
     row=lambda study, case: converge(case),
-    targets=_targets,
+    targets=no_row_fails("scenes in which the rigid world does not converge"),
 )

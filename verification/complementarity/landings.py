@@ -59,7 +59,6 @@ def _row(study: Study, name: str) -> Row:
         "impulse at the left [N s]": float(formula.impulses[0]),
         "impulse at the right [N s]": float(formula.impulses[1]),
         "right contact after pushing only [m/s]": float(rows[1] @ pushed.velocity),
-        "angular velocity after pushing only [rad/s]": float(pushed.velocity[1]),
     }
 
 

@@ -11,7 +11,7 @@ project's scenes, hyperstatic families, and patches with friction. They are the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -24,15 +24,15 @@ from reference.complementarity.solution import Solution
 from reference.complementarity.solvers import SOLVERS
 from reference.datasets import DatasetError, StoredProblem, problem_files, read_problem
 from reference.one_thread import one_thread
-from verification.check import Check, Study
+from verification.check import Check, Study, no_row_fails
 from verification.complementarity.families import random_cases
 from verification.complementarity.of_runs import scene_impacts
 from verification.cost.impact_times import LONGEST
 from verification.cost.problems import patch, pile
-from verification.finding import Failure, Part, attempt
+from verification.finding import Failure, attempt
 from verification.hard_cases import HARD_CASES
 from verification.impacts import Floats
-from verification.table import Row, Table
+from verification.table import Row
 
 VERDICTS = ("solved", "refused", "failed", "missing", "left out")
 OWN = "own problems"  # name of the collection that `own_problems` makes
@@ -147,13 +147,9 @@ def _collection(name: str, folder: Path) -> Check:
         cases=lambda study: on_problems(study, name, folder).lines,
         row=lambda study, line: line,
         holds=lambda row: "solved" in row.values(),
-        targets=_targets,
+        targets=no_row_fails("problems that no solver solves"),
         timed=["spread of velocities"],
     )
-
-
-def _targets(table: Table) -> Iterator[Part]:
-    yield Part.on("problems that no solver solves", table.holds.count(False), 0)
 
 
 def _solver(study: Study, name: str) -> Row:

@@ -25,10 +25,8 @@ def _numbers(tables: Mapping[str, Table]) -> Values:
     landings = tables[LANDINGS.key]
     scenes = found.where(kind=SCENE)
     piles = tables[PILES.key]
-    solvers = tables[SOLVER_TABLE.key]
     return {
         "impacts": sum(found["cases"]),
-        "agree": sum(found["agree"]),
         "contradictions": sum(found["contradictions"]),
         "points": len(grid.rows),
         "points_as_predicted": sum(grid.decided),
@@ -37,7 +35,6 @@ def _numbers(tables: Mapping[str, Table]) -> Values:
         "scene_impacts_that_pull": sum(scenes["differ"]),
         "pile_limit": max(piles["most contacts that agree"]),
         "pushing_from_the_lcp": max(piles["pushing only, from the LCP"]),
-        "solvers": len(solvers.rows),
     }
 
 

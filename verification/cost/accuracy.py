@@ -1,7 +1,6 @@
-"""Error, energy gain and restitution residual of one impact against computing time, and the best
-method for a budget.
+"""Error and energy gain of one impact against computing time, and the best method for a budget.
 
-Every method resolves the same nine impacts of a size (`verification.impacts.timed_problems`),
+Every method resolves the same nine impacts of a size (`verification.impacts.timed_problem`),
 compiled or from Python. Methods that can be stopped early run with several amounts of work.
 `choose` finds the method for a budget of time.
 """
@@ -18,15 +17,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from iapb.errors import ArgumentError, IapbError, MissingDependencyError
+from iapb.errors import ArgumentError, IapbError
 from reference.exact import relative_energy_gain
 from reference.one_thread import one_thread
 from verification.check import Check, Study
-from verification.clock import sampler, seconds, take_turns
+from verification.clock import sampler, take_turns, timed
 from verification.cost import calls
 from verification.cost.calls import PRINTED, Call
 from verification.finding import Failure, attempt, counted
-from verification.impacts import TIMED_HARDNESS, Floats, ImpactCase, timed_problems
+from verification.impacts import TIMED_HARDNESS, ImpactCase, timed_problem
 from verification.table import Row, Table, table_from
 
 COMPILED = "compiled"
@@ -123,9 +122,8 @@ def work_precision(
     -------
     Table
         One row per impact and way: the median time; |v⁺ − exact v⁺| / |v⁻| in the kinetic metric;
-        the exact (KE⁺ − KE⁻)/KE⁻, or 0 for a loss; max |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|). The outcome is
-        "ok", "too slow" (more than LONGEST), or "failed" with its reason; a failed row has only the
-        time until the method gave up.
+        the exact (KE⁺ − KE⁻)/KE⁻, or 0 for a loss. The outcome is "ok", "too slow" (more than
+        LONGEST), or "failed" with its reason.
     """
     study = Study(failures=failures)
     cases = _hard(sizes)
@@ -136,102 +134,79 @@ def work_precision(
 def _measured(rounds: int, study: Study, case: Hard) -> Iterator[Row]:
     """Yield the rows of one impact; a way that was too slow on an earlier impact is not tried
     again."""
-    problem = timed_problems(*case[:2])[case.number]
+    problem = timed_problem(*case)
     slow: set[Way] = study.once("slow", set)
-    made: dict[Way, Call] = {}
-    ways = [way for way in WAYS if way.rows < case.coordinates]
-
-    def tried(way: Way) -> tuple[Floats | str, float]:
-        try:
-            call = made[way] = way.make(problem)
-        except MissingDependencyError as error:
-            return str(error), 0.0
-        _try(call)  # a method compiles at its first call
-        answer: list[Floats | str] = []
-        spent = seconds(lambda: answer.append(_try(call)))
-        return (answer[0] if isinstance(answer[0], str) else answer[0].copy()), spent
-
+    tried: dict[Way, Tried] = {}
     with one_thread():
-        found = {
-            way: ("", LONGEST)
-            if way in slow
-            else attempt(
-                f"{problem.label}, {way.method}, {way.work}", partial(tried, way), study.failures
-            )
-            for way in ways
+        for way in WAYS:
+            if way.rows >= case.coordinates:
+                continue
+            name = f"{problem.family}, {way.method}, {way.work}"
+            trying = partial(_try, way, problem)
+            one = Tried(LONGEST) if way in slow else attempt(name, trying, study.failures)
+            if one is not None:
+                tried[way] = one
+        samplers = {
+            way: sampler(one.call)
+            for way, one in tried.items()
+            if one.call is not None and not one.fault and one.seconds < LONGEST
         }
-        good = [
-            way
-            for way, one in found.items()
-            if one and not isinstance(one[0], str) and one[1] < LONGEST
-        ]
-        times = take_turns(
-            {way: sampler(made[way]) for way in good}, rounds, warm=False, enough=_ENOUGH
-        )
-    for way, answered in found.items():
-        if answered is None:
-            continue
-        answer, spent = answered
+        times = take_turns(samplers, rounds, warm=False, enough=_ENOUGH)
+    for way, one in tried.items():
         row: dict[str, Any] = {
             "contacts": problem.contacts,
             "coordinates": problem.coordinates,
-            "problem": problem.label,
+            "problem": problem.family,
             "method": way.method,
             "work": way.work,
             "called": way.called,
             **dict.fromkeys(MEASURED),
-            "failed after [µs]": 1e6 * spent,
         }
         if way in times:
-            taken = times[way]
-            row |= {
-                "time [µs]": 1e6 * taken.median,
-                "outcome": "ok",
-                "failed after [µs]": None,
-                "quartiles [µs]": f"{taken.lower * 1e6:.3g} to {taken.upper * 1e6:.3g}",
-            }
-            row |= _quality(problem, answer)
-        elif spent >= LONGEST:
+            row["time [µs]"] = 1e6 * times[way].median
+            row["outcome"] = "ok"
+            row |= _quality(problem, one.v_plus)
+        elif one.seconds >= LONGEST:
             slow.add(way)
             row["outcome"] = TOO_SLOW
         else:
-            row["outcome"] = f"failed: {answer}"
+            row["outcome"] = f"failed: {one.fault}"
         yield row
 
 
-def _try(call: Call) -> Floats | str:
-    """Return v⁺, or the reason why the call gives no v⁺."""
+class Tried(NamedTuple):
+    """One call of a way: its time [s], v⁺ (d,), and why there is none."""
+
+    seconds: float
+    call: Call | None = None
+    v_plus: Any = None
+    fault: str = ""
+
+
+def _try(way: Way, problem: ImpactCase) -> Tried:
     try:
-        v_plus = call()
+        call = way.make(problem)
+        call()  # a method compiles at its first call
+        v_plus, spent = timed(call)
     except IapbError as error:
-        return str(error)
-    return v_plus if np.all(np.isfinite(v_plus)) else "the velocity is not finite"
+        return Tried(0.0, fault=str(error))
+    fault = "" if np.all(np.isfinite(v_plus)) else "the velocity is not finite"
+    return Tried(spent, call, v_plus.copy(), fault)
 
 
 def _quality(problem: ImpactCase, v_plus: Any) -> Row:
     error = np.array(
         [float(Fraction(x) - t) for x, t in zip(v_plus.tolist(), problem.truth, strict=True)]
     )
-    found = {
+    gain = relative_energy_gain(problem.mass_matrix, problem.velocity, v_plus)
+    return {
         "relative error": float(np.linalg.norm(problem.lower.T @ error)) / problem.speed,
         # a loss with e < 1 is correct, so it is no error
-        "relative energy gain": max(
-            relative_energy_gain(problem.mass_matrix, problem.velocity, v_plus), 0.0
-        ),
-        "restitution residual": problem.unmet_restitution(v_plus),
+        "relative energy gain": max(gain, 0.0),
     }
-    return {name: value if math.isfinite(value) else None for name, value in found.items()}
 
 
-MEASURED = (
-    "time [µs]",
-    "quartiles [µs]",
-    "relative error",
-    "relative energy gain",
-    "restitution residual",
-    "failed after [µs]",
-    "outcome",
-)
+MEASURED = ("time [µs]", "relative error", "relative energy gain", "outcome")
 ACCURACY = Check(
     key="accuracy",
     question="How exact is an impact in the time that it takes?",
@@ -364,9 +339,7 @@ def by_way(measured: Table) -> dict[tuple[str, str], list[dict[str, Any]]]:
     return ways
 
 
-def which_method(
-    budget: float, contacts: int, coordinates: int, rounds: int = ROUNDS
-) -> tuple[Choice, ...]:
+def which_method(budget: float, contacts: int, coordinates: int) -> tuple[Choice, ...]:
     """Measure one size of impact on this machine and return the best method, compiled and from
     Python.
 
@@ -374,7 +347,6 @@ def which_method(
     ----------
     budget : time for one impact [s].
     contacts, coordinates : the size of the impact.
-    rounds : number of times that each way is timed, in random order; the median counts.
 
     Returns
     -------
@@ -389,14 +361,14 @@ def which_method(
     """
     if isinstance(budget, bool) or not isinstance(budget, Real) or not 0.0 < budget < math.inf:
         raise ArgumentError("budget", budget, "a finite number of seconds above 0")
-    for name, value in (("contacts", contacts), ("coordinates", coordinates), ("rounds", rounds)):
+    for name, value in (("contacts", contacts), ("coordinates", coordinates)):
         if (
             isinstance(value, bool)
             or not isinstance(value, int | np.integer)
             or not 1 <= value <= LARGEST
         ):
             raise ArgumentError(name, value, f"a whole number from 1 to {LARGEST:,}")
-    measured = work_precision([(contacts, coordinates)], rounds)
+    measured = work_precision([(contacts, coordinates)])
     found = (
         choose(measured, budget, contacts, coordinates, called) for called in (COMPILED, PYTHON)
     )

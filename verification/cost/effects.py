@@ -3,8 +3,8 @@ save.
 
 Times are compared on one and the same motion: with the effects that the scene needs, and with every
 effect that has a switch, which then changes nothing. `LEFT_OUT` defines how an effect is left out:
-by other values of the scene, another law or coupling, a switch of the compiled step, or fewer pairs
-of shapes that may touch. A motion without an effect is another motion, so its time is not compared.
+by other values of the scene, another law or coupling, or a switch of the compiled step; contacts
+between bodies cannot. A motion without an effect is another motion, so its time is not compared.
 """
 
 from __future__ import annotations
@@ -52,8 +52,7 @@ LEFT_OUT: dict[str, dict[str, Any]] = {  # effect -> the variant of the scene wi
     "hand_force": {
         "values": {"hand.force": None, "hand.force_table": (), "hand.force_function": ()}
     },
-    "wall_contacts": {"untouched": "wall"},
-    "body_contacts": {"untouched": "body"},
+    "wall_contacts": {"values": {"walls": ()}},
     "impulses": {"impulses": False},
     "coupling": {"coupled": False},
     **{
@@ -143,7 +142,6 @@ MEASURED = (
     "without it",  # SAME, MOVES or STOPS
     # largest distance of the tool (without a hand: of any body) from that with the effect
     "position [mm]",
-    "device [mm]",  # the same distance of the device
     "energy [%]",  # largest change of kinetic energy, relative to its largest value with the effect
 )
 
@@ -170,7 +168,6 @@ def difference(whole: Loop, other: Loop) -> Row:
     values = (
         SAME if whole.same_motion(other) else MOVES,
         _farthest(whole.places(), other.places()),
-        _farthest(whole.device_places(), other.device_places()),
         100.0 * float(change),
     )
     return dict(zip(MEASURED, values, strict=True))
@@ -272,8 +269,7 @@ def _state(row: Row) -> str:
 
 class Loop(RecordedLoop):
     """The simulation loop of a scene, or of a variant of it: with other values, without impulses or
-    coupling, with some switches turned on or off, or with the pairs of a kind (see
-    `_leave_out_pairs`) untouched."""
+    coupling, or with some switches turned on or off."""
 
     def __init__(
         self,
@@ -285,7 +281,6 @@ class Loop(RecordedLoop):
         coupled: bool = True,
         switches: Iterable[str] = (),
         on: bool = False,
-        untouched: str = "",
     ) -> None:
         force = (
             [0.0] * len(scene.hand.force) if scene.hand is not None else None
@@ -295,8 +290,6 @@ class Loop(RecordedLoop):
         law = world.law if impulses else Penalty()
         coupling = world.coupling_in(changed) if coupled else NoCoupling()
         super().__init__(Simulation(changed, law, coupling), scene.steps)
-        if untouched:
-            _leave_out_pairs(self.simulation, untouched)
         if switches:
             given = self.simulation.world
             turned = engine.Switches(**given.switches.members | dict.fromkeys(switches, on))
@@ -342,31 +335,8 @@ class Loop(RecordedLoop):
                 found.append((center, *(center + radius * R.T)))
         return np.array(found).reshape(len(states), -1, 3)
 
-    def device_places(self) -> Floats:
-        """Return positions of the device's bodies at the compared instants (n, k, 3) [m]; empty
-        without a device."""
-        if self.simulation.coupling.name == "none":
-            return np.zeros((0, 0, 3))
-        device = self.simulation.system.device_mechanism()
-        return np.array([device.placements(q)[1] for q in self.states("device_q")])
-
     def kinetic(self) -> Floats:
         """Return the kinetic energy at the compared instants (n,) [J]."""
         states = zip(self.states("q"), self.states("v"), strict=True)
         energy = self.simulation.system.mechanism
         return np.array([energy.kinetic_energy(q, v) for q, v in states])
-
-
-def _leave_out_pairs(simulation: Any, kind: str) -> None:
-    """Remove the pairs of shapes with a wall (`kind` "wall"), or the pairs of two trees
-    ("body")."""
-    system = simulation.system
-    bodies = system.shapes.body
-    tree = system.mechanism.tree_of_body
-    a = bodies[system.pairs[:, 0]]
-    b = bodies[system.pairs[:, 1]]
-    walls = b < 0
-    gone = walls if kind == "wall" else ~walls & (tree[a] != tree[np.maximum(b, 0)])
-    system.pairs = np.ascontiguousarray(system.pairs[~gone])
-    system._worlds.clear()
-    simulation.world = system.world_under(simulation.law)

@@ -18,24 +18,30 @@ lcp_lemke = import_lcp_lemke()
 
 
 @njit(cache=True)
+def whiten_rows(lower, rows, whitened, square):
+    """Write A = J L⁻ᵀ (c, d), row by row, and the squared lengths of its rows (c,)."""
+    for i in range(rows.shape[0]):
+        for k in range(rows.shape[1]):
+            whitened[i, k] = (rows[i, k] - dot_of(lower[k], whitened[i, :k])) / lower[k, k]
+        square[i] = dot_of(whitened[i], whitened[i])
+
+
+@njit(cache=True)
 def repeat_lemke(mass_matrix, rows, v, restitution, v_plus, times):
     """Resolve the impact of v on rows (c, d) `times` times; write v⁺ (d,), NaN if Lemke's method
     fails."""
     c, d = rows.shape
     lower = np.zeros((d, d))
     whitened = np.zeros((c, d))
+    square = np.zeros(c)
     delassus = np.zeros((c, c))
     offset = np.zeros(c)
     for _ in range(times):
         cholesky(mass_matrix, lower)
         inertia = 0.0
         speed = 0.0
+        whiten_rows(lower, rows, whitened, square)
         for i in range(c):
-            for k in range(d):  # A = J L⁻ᵀ, row by row
-                rest = rows[i, k]
-                for m in range(k):
-                    rest -= lower[k, m] * whitened[i, m]
-                whitened[i, k] = rest / lower[k, k]
             for j in range(i + 1):
                 delassus[i, j] = delassus[j, i] = np.dot(whitened[i], whitened[j])
             offset[i] = (1.0 + restitution) * np.dot(rows[i], v)
@@ -49,15 +55,6 @@ def repeat_lemke(mass_matrix, rows, v, restitution, v_plus, times):
         v_plus += v
         if not result.success:
             v_plus[:] = np.nan
-
-
-@njit(cache=True)
-def whiten_rows(lower, rows, whitened, square):
-    """Write A = J L⁻ᵀ (c, d), row by row, and the squared lengths of its rows (c,)."""
-    for i in range(rows.shape[0]):
-        for k in range(rows.shape[1]):
-            whitened[i, k] = (rows[i, k] - dot_of(lower[k], whitened[i, :k])) / lower[k, k]
-        square[i] = dot_of(whitened[i], whitened[i])
 
 
 @njit(cache=True)

@@ -70,7 +70,7 @@ World = Callable[[Scene], tuple[Run, float]]
 
 BELOW = "below the truth's error bound"
 Record = dict[str, Any]
-ERRORS = ("position", "energy", "signed energy", "energy made")
+ERRORS = ("position", "energy made")
 
 
 def scene_of(name: str) -> Scene:
@@ -83,7 +83,6 @@ def motions_of(study: Study, name: str) -> Iterator[Row]:
 
     position : largest distance of a body's centre, or of a point half a length beside it, from the
         truth
-    signed energy : error of the energy at the end; positive is a gain
     energy made : largest rise of kinetic plus potential energy above its start value, without
         elastic energy
     time : computing time per simulated second; of a failed run until it failed, of a time-out the
@@ -111,7 +110,7 @@ FIT_FALL = 10.0
 def by_chance(run: Row) -> bool:
     """Whether the error of position is below the truth's own bound, because the step meets the
     instants of impact."""
-    return "position" in run["note"] and str(run["note"]).endswith(BELOW)
+    return bool(run["note"] == BELOW)
 
 
 def runs_of(motions: Table, **chosen: str) -> list[Record]:
@@ -315,7 +314,7 @@ def _tried(world: World, scene: Scene) -> tuple[Run, float] | Exception:
 
 
 class Judge:
-    """The truth of a scene, the errors of a motion, and bounds of the truth's own errors."""
+    """The truth of a scene, the errors of a motion, and a bound of the truth's own error."""
 
     def __init__(self, scene: Scene, length: float) -> None:
         self.length = length
@@ -325,35 +324,21 @@ class Judge:
         q, v = self.truth.state(np.linspace(0.0, scene.duration, 1001))
         self.kinetic = float(self.mechanism.energies(q, v, self.gravity)[0].max())
         self.start = float(self._energy(q, v)[0])
-        bound = self.truth.bound
-        mass = sum(body.mass for body in scene.bodies)
-        speed = float(np.linalg.norm(v.reshape(len(v), -1, 6)[..., :3], axis=-1).max())
-        energy = mass * (
-            speed * bound.velocity + float(np.linalg.norm(self.gravity)) * bound.position
-        )
-        self.bounds = {
-            "position": bound.position
-            * (1.0 + 0.5 * length)
-            / length,  # the second point turns too
-            "energy": energy / self.kinetic,
-        }
+        # the second point turns too
+        self.bound = self.truth.bound.position * (1.0 + 0.5 * length) / length
 
     def errors(self, run: Run) -> tuple[dict[str, float], str]:
-        """Return the errors for the table, at least the truth's bounds, and a note on errors below
-        their bound."""
+        """Return the errors for the table, at least the truth's bound, and a note if below it."""
         kept = slice(None, None, max(1, round(1.0 / (SAMPLES * run.dt))))
-        true_q, true_v = self.truth.state(np.minimum(run.time[kept], self.truth.end))
-        energy = self._energy(run.q[kept], run.v[kept])
-        signed = float(energy[-1] - self._energy(true_q, true_v)[-1]) / self.kinetic
+        true_q, _ = self.truth.state(np.minimum(run.time[kept], self.truth.end))
         away = np.linalg.norm(self._points(run.q[kept]) - self._points(true_q), axis=-1)
-        found = {"position": float(away.max()) / self.length, "energy": abs(signed)}
-        below = [name for name, value in found.items() if value < self.bounds[name]]
-        found = {name: max(value, self.bounds[name]) for name, value in found.items()}
-        gain = float((energy - self.start).max()) / self.kinetic
-        return found | {
-            "signed energy": float(np.copysign(found["energy"], signed)),
-            "energy made": max(0.0, gain - self.bounds["energy"]),
-        }, (f"{', '.join(below)} {BELOW}" if below else "")
+        error = float(away.max()) / self.length
+        made = float((self._energy(run.q[kept], run.v[kept]) - self.start).max())
+        found = {
+            "position": max(error, self.bound),
+            "energy made": max(0.0, made / self.kinetic),
+        }
+        return found, BELOW if error < self.bound else ""
 
     def _energy(self, q: Floats, v: Floats) -> Floats:
         kinetic, potential = self.mechanism.energies(q, v, self.gravity)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -22,16 +22,11 @@ Found = (
 @dataclass(frozen=True)
 class LawResidual:
     """Residual of one law; it passes if value <= tolerance (a value that is not finite never
-    passes).
-
-    For a law with tolerance 0, `excused` is the largest value that rounding can cause. A value up
-    to `excused` is a failure, but not a severe one.
-    """
+    passes)."""
 
     law: str
     value: float
     tolerance: float
-    excused: float = field(default=0.0, repr=False)
 
     @property
     def ratio(self) -> float:
@@ -53,11 +48,6 @@ class LawResidual:
     def passed(self) -> bool:
         """Whether the law holds within its tolerance."""
         return self.ratio <= 1.0
-
-    @property
-    def severe(self) -> bool:
-        """Whether rounding cannot explain the failure."""
-        return not self.passed and not self.value <= self.excused
 
 
 @dataclass

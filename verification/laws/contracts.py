@@ -46,7 +46,7 @@ from verification.impacts import (
     draw_wide_case,
     over,
 )
-from verification.laws.bounds import KIT, ONE_SIDED, Bounds, Found, Law, LawResidual, law
+from verification.laws.bounds import KIT, ONE_SIDED, Bounds, Found, Law, law
 from verification.laws.equality import (
     COMPARING,
     LAWS,
@@ -434,15 +434,16 @@ def friction_is_not_remembered(case: ImpactCase, resolver: Resolver, bounds: Bou
     return impulse_comes_from_the_contacts(smooth, lambda *given: v_plus, bounds)
 
 
-def no_gain_in_real_arithmetic(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> LawResidual:
+# A resolver may promise no gain at all, not even in the last bit.
+EXACT_LAWS: dict[str, Law] = {}
+
+
+@law(EXACT_LAWS, "exact_energy", "KE⁺ ≤ KE⁻ in real arithmetic")
+def no_gain_in_real_arithmetic(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> Found:
     """(KE⁺ − KE⁻)/KE⁻ in rationals on the doubles, with tolerance 0; infinite if motion appears
     from rest."""
-    relative = relative_energy_gain(case.mass_matrix, case.velocity, own_outcome(resolver, case))
-    return LawResidual("exact_energy", relative, 0.0, bounds.energy_gain(case))
-
-
-# A resolver may promise no gain at all, not even in the last bit.
-EXACT_LAWS = {"exact_energy": Law("KE⁺ ≤ KE⁻ in real arithmetic", no_gain_in_real_arithmetic)}
+    v_plus = own_outcome(resolver, case)
+    return relative_energy_gain(case.mass_matrix, case.velocity, v_plus), 0.0
 
 
 class Contract(NamedTuple):

@@ -154,14 +154,9 @@ class Hunt:
         own = pickle.dumps(case.given())
         every = list(calls)
         before = every[: len(every) - 1 - every[::-1].index(own)] if own in every else every
-        tried = (some for given in (before, every) for some in _parts(given))
-        earlier = next((some for some in tried if self.breaks(case, earlier=some)), None)
+        earlier = next((some for some in (before, every) if self.breaks(case, earlier=some)), None)
         if earlier is None:
             return None
-        for count in (1, len(earlier)):  # the same call again and again says it best
-            if self.repeats(count, case):
-                again = shrink(case, partial(self.repeats, count))
-                return again, tuple(_again(again, count))
         size = len(earlier) // 2
         while size:
             first = 0
@@ -172,6 +167,10 @@ class Hunt:
                 else:
                     first += size
             size //= 2
+        for count in (1, len(earlier)):  # the same call again and again says it best
+            if self.repeats(count, case):
+                again = shrink(case, partial(self.repeats, count))
+                return again, tuple(_again(again, count))
         return shrink(case, partial(self.breaks, earlier=earlier)), tuple(earlier)
 
     def repeats(self, count: int, case: ImpactCase) -> bool:
@@ -196,16 +195,6 @@ class Hunt:
         self.replays(earlier)
         residual_of(self.law, replace(case), recorded, self.bounds)
         return tuple(calls)
-
-
-def _parts(calls: list[bytes]) -> Iterator[list[bytes]]:
-    """Yield the last call, the first, the last two, …, and all calls."""
-    size = 1
-    while size < len(calls):
-        yield calls[-size:]
-        yield calls[:size]
-        size *= 2
-    yield calls
 
 
 def _again(case: ImpactCase, count: int) -> list[bytes]:

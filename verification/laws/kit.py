@@ -43,7 +43,6 @@ PATIENCE = 600.0  # [s] ten times as long
 CALL_LIMIT = 60.0  # [s]
 SHRINKING = 60.0  # [s] for a counterexample
 LITTLE_TIME = 2.0  # [s] for it where the patience is at its end
-ITERATED = 1e-4  # largest residual that the accuracy of an iteration may explain
 
 
 @dataclass
@@ -53,8 +52,6 @@ class LawVerdict(LawCount):
     Attributes
     ----------
     checked, failures : impacts the law applied to, and those that broke it.
-    severe : number of failures that are larger than rounding; equal to `failures` except for
-        ``exact_energy``.
     worst : the residual with the largest value / tolerance (None if the law never applied).
     largest : largest value of the residual, whatever its tolerance.
     largest_case : the impact that breaks the law with the largest residual; None if no impact
@@ -74,7 +71,6 @@ class LawVerdict(LawCount):
     largest_case: ImpactCase | None = None
     fault: str = ""
     error: Exception | None = None
-    severe: int = 0
     smallest_case: ImpactCase | None = None
     fault_case: ImpactCase | None = None
     first_calls: dict[bool, tuple[ImpactCase, list[bytes]]] = field(
@@ -93,9 +89,7 @@ class LawVerdict(LawCount):
     def __str__(self) -> str:
         mark = "kept  " if self.passed else "BROKEN"
         worst = f"worst {self.worst.words}" if self.worst else "-"
-        within = self.failures - self.severe
-        grades = f" ({self.severe} by more than rounding, {within} within it)" if within else ""
-        line = f"  {mark} {self.statement}: {self.failures} of {self.checked} impacts break it{grades}, {worst}"
+        line = f"  {mark} {self.statement}: {self.failures} of {self.checked} impacts break it, {worst}"
         return f"{line}\n         {self.fault}" if self.fault else line
 
     def try_on(self, law: Law, case: ImpactCase, resolver: Resolver, bounds: Bounds) -> None:
@@ -113,7 +107,6 @@ class LawVerdict(LawCount):
         passed = self.add(residual)
         if self.worst is residual:
             self.worst_case = case
-        self.severe += residual.severe
         self.largest = max(self.largest, residual.value)
         if passed:
             return
@@ -189,7 +182,6 @@ class PassivityReport(Report):
     unfinished : why fewer impacts were tried than requested; empty if all were tried.
     found : smallest counterexample to the first law that an answer broke, and to the first law for
         which an answer was unusable.
-    hints : probable causes that are no fault of the resolver's law.
     contract : contract that the resolver was tested against; see `verification.laws.contracts`.
     tested : the resolver, for the import line of the generated test.
     call_limit : [s] limit of one call.
@@ -200,7 +192,6 @@ class PassivityReport(Report):
     seed: int
     verdicts: tuple[LawVerdict, ...]
     found: tuple[Counterexample, ...] = ()
-    hints: tuple[str, ...] = ()
     unfinished: str = ""
     bounds: Bounds = KIT
     tested: Any = None
@@ -253,7 +244,6 @@ class PassivityReport(Report):
             lines.append(
                 f"  worst case: {worst.law} at {worst.worst.ratio:.2g} of its tolerance, {family}"
             )
-        lines += [f"  hint: {hint}" for hint in self.hints]
         for one in self.found:
             lines += ["", f"{one.title}:", *_shown(one), "", "as a test:", "", self.test_of(one)]
         return "\n".join(lines)
@@ -372,7 +362,6 @@ def check_passivity(
         done = _try_all(trial, ends, progress)
         hunts = _Hunts(trial, resolver, child, search, contract, ends, progress)
         found = tuple(_counterexamples(hunts))
-        hints = tuple(_hints(hunts, found))
         watched.forget()
     late = "" if done == impacts else f"too slow: {done} of {impacts} impacts in {patience:g} s"
     return PassivityReport(
@@ -381,7 +370,6 @@ def check_passivity(
         seed,
         tuple(verdicts.values()),
         found,
-        hints,
         late,
         bounds,
         resolver,
@@ -547,19 +535,6 @@ class _Hunts(NamedTuple):
     ends: float
     progress: Callable[[int, int], None] | None
 
-    def begin(self, law: str, fault: str = "") -> Hunt:
-        """Begin the search for a counterexample to a law."""
-        began = time.monotonic()
-        seconds = min(SHRINKING, max(LITTLE_TIME, self.ends - began))
-
-        def tell() -> None:
-            if self.progress is not None:
-                spent = min(time.monotonic() - began, seconds)
-                self.progress(int(spent), int(seconds))
-
-        given = self.trial.laws[law], fault, self.trial.bounds, self.resolver, self.child
-        return Hunt(*given, seconds, tell)
-
 
 def _counterexamples(hunts: _Hunts) -> Iterator[Counterexample]:
     """Yield a counterexample to the first law that an answer broke, and one to the first law for
@@ -582,7 +557,16 @@ def _counterexample(
     """Return the smallest counterexample that hypothesis or the drawn impacts give, shrunk."""
     if kind_of(fault) == HANGS:
         return Counterexample(drawn[0], broken.law, fault)
-    hunt = hunts.begin(broken.law, fault)
+    began = time.monotonic()
+    seconds = min(SHRINKING, max(LITTLE_TIME, hunts.ends - began))
+
+    def tell() -> None:
+        if hunts.progress is not None:
+            spent = min(time.monotonic() - began, seconds)
+            hunts.progress(int(spent), int(seconds))
+
+    given = hunts.trial.laws[broken.law], fault, hunts.trial.bounds, hunts.resolver, hunts.child
+    hunt = Hunt(*given, seconds, tell)
     kind = "unequal" if broken.law in UNEQUAL_LAWS else hunts.contract
 
     def search(fails: Callable[[ImpactCase], bool]) -> ImpactCase | None:
@@ -603,40 +587,3 @@ def _counterexample(
     case = drawn[0] if case is None else case
     calls = hunt.calls_for(case, earlier)
     return Counterexample(case, broken.law, fault, calls, earlier, fresh)
-
-
-def _hints(hunts: _Hunts, found: tuple[Counterexample, ...]) -> Iterator[str]:
-    """Yield probable causes of failures that are no fault of the resolver's law."""
-    watched = hunts.trial.resolver
-    verdicts = hunts.trial.verdicts.values()
-    broken = [verdict for verdict in verdicts if not verdict.passed]
-    largest = max((verdict.largest for verdict in broken), default=0.0)
-    table = "KIT" if hunts.contract == "equality" else "ONE_SIDED"
-    wider = 0.0
-    cause = ""
-    if broken and 0 < watched.changed == watched.rounded:
-        wider = 1e-4
-        cause = "The resolver computes in single precision (set largest_condition=100)"
-    elif 0.0 < largest < ITERATED:
-        wider = 10.0 ** np.ceil(np.log10(largest))
-        cause = f"No error is above {wider:.0e}, which an iteration that ends early can explain"
-    if cause:
-        yield (
-            f"{cause}. Widen the tolerances: bounds=dataclasses.replace(verification.laws.bounds."
-            f"{table}, least={wider:.0e}, restitution={wider:.0e}). Errors below {wider:.0e} of v "
-            "are not noticed then"
-        )
-    case = found[0].case if found else None
-    if [verdict.law for verdict in broken] != ["kinetic_energy"] or case is None:
-        return
-    if case.friction is None or not case.friction.any() or case.restitution == 0.0:
-        return
-    hunt = hunts.begin("kinetic_energy")
-    without = replace(case, restitution=0.0), replace(case, friction=0.0 * case.friction)
-    if hunt.breaks(case, earlier=() if hunts.child else None) and not any(
-        hunt.breaks(one) for one in without
-    ):
-        yield (
-            "with e > 0, Coulomb's friction and Newton's restitution together can gain energy, "
-            "whatever the solver (Kane and Levinson 1985). `laws` can leave kinetic_energy out"
-        )

@@ -13,7 +13,6 @@ import numpy as np
 from iapb.run import Run
 from iapb.system import System
 from verification.impacts import Floats, ImpactCase
-from verification.laws.engine import saturated
 from verification.laws.resolver import (
     RANK_CUT,
     Resolver,
@@ -189,9 +188,7 @@ def one_factor_for_all(case: SceneCase) -> Run:
 
 PLANTED_ENGINE_FAULTS: dict[str, Fault] = {
     "truncation": Fault("rows not made orthogonal", not_orthogonal),
-    "device_limits": Fault("saturation, component by component", saturated),
     "group_splitting": Fault("one factor for all groups", one_factor_for_all),
-    "extremes": Fault("plain numpy without checks", sound_resolver),
 }
 
 

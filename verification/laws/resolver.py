@@ -30,15 +30,12 @@ class Watched:
     suspects : (case, v⁺) of answers that seem to gain energy in plain doubles; the kit checks them
         in double-double.
     calls : the pickled arguments of the last calls.
-    changed, rounded : answers other than v⁻ and 0, and those of them that fit in single precision.
     """
 
     def __init__(self, resolver: Resolver) -> None:
         self.resolver = resolver
         self.suspects: list[tuple[ImpactCase, Floats]] = []
         self.calls: deque[bytes] = deque(maxlen=REMEMBERED)
-        self.changed = 0
-        self.rounded = 0
 
     def __call__(self, *given: Any) -> Any:
         self.calls.append(pickle.dumps(given))
@@ -50,12 +47,8 @@ class Watched:
         self.calls.clear()
 
     def look_at(self, case: ImpactCase, v_plus: Floats) -> None:
-        """Count the answer, and add it to `suspects` if its kinetic energy exceeds that before the
-        impact by more than SUSPICIOUS."""
-        if v_plus.any() and not np.array_equal(v_plus, case.velocity):
-            with np.errstate(over="ignore"):
-                self.rounded += np.array_equal(np.asarray(v_plus, np.float32), v_plus)
-            self.changed += 1
+        """Add the answer to `suspects` if its kinetic energy exceeds that before the impact by more
+        than SUSPICIOUS."""
         before = float(case.velocity @ (case.mass_matrix @ case.velocity))
         after = float(v_plus @ (case.mass_matrix @ v_plus))
         if not after <= before * (1.0 + SUSPICIOUS):

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from reference import Floats
 from reference.random_mechanisms import random_mechanism, random_state
-from verification.check import Check, Study
-from verification.finding import Part
-from verification.table import Row, Table
+from verification.check import Check, Study, no_row_fails
+from verification.table import Row
 
 SIZES = (1, 3, 10, 30)  # joints
 MATRICES = {"quick": 150, "full": 2000}
@@ -51,16 +48,11 @@ def _definite(study: Study, joints: int) -> Row:
     }
 
 
-def _targets(table: Table) -> Iterator[Part]:
-    wrong = table.holds.count(False)
-    yield Part.on("sizes of trees with a mass matrix that is not positive definite", wrong, 0)
-
-
 POSITIVE_DEFINITE = Check(
     key="positive definite",
     question="Is the mass matrix positive definite wherever rounding permits a judgement?",
     cases=lambda _: SIZES,
     row=_definite,
-    targets=_targets,
+    targets=no_row_fails("sizes of trees with a mass matrix that is not positive definite"),
     holds=lambda row: bool(row["least eigenvalue × condition"] > 0.0),
 )

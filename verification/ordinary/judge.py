@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from importlib.util import find_spec
 
 import numpy as np
@@ -11,10 +10,9 @@ from scipy.spatial.transform import Rotation
 from iapb.run import Run
 from iapb.scene.reading import scene_from_values
 from reference.worlds import run_world
-from verification.check import Check, Study
-from verification.finding import Part
+from verification.check import Check, Study, no_row_fails
 from verification.ordinary.scenes import CASES, FAMILIES, Motion
-from verification.table import Row, Table
+from verification.table import Row
 
 OURS = "IAPB"
 THEIRS = "MuJoCo"
@@ -66,16 +64,11 @@ def is_installed(title: str) -> bool:
     return title != THEIRS or find_spec("mujoco") is not None
 
 
-def _targets(table: Table) -> Iterator[Part]:
-    """Yield the target of the default world: no ordinary scene is wrong."""
-    yield Part.on("ordinary scenes that come out wrong", table.holds.count(False), 0)
-
-
 ORDINARY = Check(
     key="ordinary",
     question="Do scenes of the first day come out right in the default world, at a step of 1 ms?",
     cases=lambda study: CASES,
     row=_row,
     holds=lambda row: bool(row[f"{OURS} is right"]),
-    targets=_targets,
+    targets=no_row_fails("ordinary scenes that come out wrong"),
 )

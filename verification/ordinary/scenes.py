@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache
 from itertools import pairwise, product
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -52,15 +52,16 @@ Quantity = Callable[[Motion], Any]
 class Case:
     """A scene with its truth.
 
-    scale : what the error is divided by, in the unit of the quantity; tolerance : largest relative
-        error that is right
+    truth, scale : values, or functions that compute them; scale : what the error is divided by, in
+        the unit of the quantity
+    tolerance : largest relative error that is right
     """
 
     name: str
     scene: Values
     quantity: Quantity
-    truth: Callable[[], Any]
-    scale: Callable[[], float]
+    truth: Any
+    scale: Any
     tolerance: float
     says: str
 
@@ -69,9 +70,12 @@ class Case:
         broken run."""
         if not all(np.isfinite(part).all() for part in motion):
             return math.inf
-        return (
-            float(np.max(np.abs(np.asarray(self.quantity(motion)) - self.truth()))) / self.scale()
-        )
+        off = np.abs(np.asarray(self.quantity(motion)) - _computed(self.truth))
+        return float(np.max(off)) / float(_computed(self.scale))
+
+
+def _computed(value: Any) -> Any:
+    return value() if callable(value) else value
 
 
 CASES: dict[str, Case] = {}
@@ -94,15 +98,9 @@ def add(
     tolerance: float = 0.01,
     scene: Values | None = None,
 ) -> None:
-    """Add a case with a scene, by default that of its name in scenes.yaml; `truth` and `scale` are
-    values or functions that compute them."""
+    """Add a case with a scene, by default that of its name in scenes.yaml."""
     values = {"name": name, "rate": 1000} | (scene or _written()[name])
-    true, size = (each if callable(each) else partial(_given, each) for each in (truth, scale))
-    CASES[name] = Case(name, values, quantity, true, size, tolerance, says)
-
-
-def _given(value: Any) -> Any:
-    return value
+    CASES[name] = Case(name, values, quantity, truth, scale, tolerance, says)
 
 
 def close_family(name: str) -> None:
@@ -147,6 +145,21 @@ def stone(name: str, corners: list[tuple[float, float]], mass: float) -> Values:
 def moved(axis: int = 0, body: int = 0) -> Quantity:
     """How far a body has moved along an axis at the end [m]."""
     return lambda motion: motion.place[-1, body, axis] - motion.place[0, body, axis]
+
+
+def at_end(axis: int, body: int | slice = slice(None)) -> Quantity:
+    """The coordinate of a body, or of all bodies, along an axis at the end [m]."""
+    return lambda motion: motion.place[-1, body, axis]
+
+
+def moved_along(direction: list[float]) -> Quantity:
+    """How far the first body has moved along a direction at the end [m]."""
+    return lambda motion: (motion.place[-1, 0] - motion.place[0, 0]) @ direction
+
+
+def highest(body: int, above: float, start: int = 0) -> Quantity:
+    """How far a body rises above a height from a step on [m]."""
+    return lambda motion: float(motion.place[start:, body, 1].max()) - above
 
 
 def farthest(size: float) -> Quantity:
@@ -281,7 +294,7 @@ add(
 add("ball_with_backspin", moved(), rolled(1, -4, 0.2, 1.5), 1.0, "returns")
 add(
     "ball_down_slope",
-    lambda motion: (motion.place[-1, 0] - motion.place[0, 0]) @ [ALONG[0], 0, ALONG[1]],
+    moved_along([ALONG[0], 0, ALONG[1]]),
     5 / 14 * G * math.sin(TILT),
     1.0,
     "5/7 g sin 20°",
@@ -316,7 +329,7 @@ add_bounces("bounce_100_percent", 1.0, 1, 3)
 add_bounces("bounce_in_space_80_percent", 0.8, 2, 2)
 add(
     "ball_hits_ball",
-    lambda motion: motion.place[-1, :, 0],
+    at_end(0),
     [-2 * R, 1 - 0.3 + 2 * R],
     1.0,
     "they swap velocities",
@@ -362,7 +375,7 @@ add("box_stays_on_slope", farthest(0.05), 0.0, 0.1, "stays: tan 20° < 0.5")
 SLID = G / 2 * (math.sin(TILT) - 0.2 * math.cos(TILT))
 add(
     "box_slides_down_slope",
-    lambda motion: (motion.place[-1, 0] - motion.place[0, 0]) @ [*ALONG, 0],
+    moved_along([*ALONG, 0]),
     SLID,
     SLID,
     "g (sin − μ cos)",
@@ -380,14 +393,14 @@ add(
 add("pushed_box_stays", farthest(0.2), 0.0, 0.1, "stays: 3.5 N < μ m g")
 add(
     "pushed_box_carries",
-    lambda motion: motion.place[-1, :, 0],
+    at_end(0),
     [(6 - 0.4 * G) / 8] * 2,
     (6 - 0.4 * G) / 8,
     "both move: a = F/2m − μg < μg",
 )
 add(
     "pushed_box_slips_away",
-    lambda motion: motion.place[-1, :, 0],
+    at_end(0),
     [(14 - 0.6 * G) / 50, 0.2 * G / 50],
     (14 - 0.6 * G) / 50,
     "the upper one follows with μg, the lower one with F/m − 3μg",
@@ -519,7 +532,7 @@ add_standing("arch", 0.1, scene=scene(2.0, [voussoir(i) for i in range(7)], FLOO
 add_standing("peg_jams", 0.03)
 add(
     "peg_goes_home",
-    lambda motion: motion.place[-1, 0, 1],
+    at_end(1, body=0),
     -0.01,
     0.032,
     "9 mm < 8 mm/2μ: reaches the end",
@@ -566,7 +579,7 @@ add(
 for name in ("ball_on_book_of_5_g", "ball_on_book_of_300_g", "ball_on_book_of_10000_g"):
     add(
         name,
-        lambda motion: float(motion.place[300:, 1, 1].max()) - 0.05,
+        highest(1, above=0.05, start=300),
         0.64 * 0.3,
         0.3,
         "rises to e² of its height",
@@ -581,7 +594,7 @@ add(
 )
 add(
     "plastic_drop",
-    lambda motion: float(motion.place[500:, 0, 1].max()) - 0.03,
+    highest(0, above=0.03, start=500),
     0.0,
     1.0,
     "stays down",
@@ -639,7 +652,7 @@ add(
 )
 add(
     "heavy_box_rests",
-    lambda motion: motion.place[-1, 0, 1],
+    at_end(1, body=0),
     0.5,
     0.01,
     "1000 t sink by less than 0.1 mm",

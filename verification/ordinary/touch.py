@@ -18,10 +18,9 @@ from scipy.optimize import brentq
 from iapb.scene.reading import scene_from_values
 from reference import Floats
 from reference.worlds import run_world
-from verification.check import Check, Study
-from verification.finding import Part
+from verification.check import Check, Study, no_row_fails
 from verification.ordinary.judge import THEIRS, WORLDS, is_installed
-from verification.table import Row, Table
+from verification.table import Row
 
 G = 9.81
 WIDTH = 0.1
@@ -298,16 +297,11 @@ def _median(motions: list[TimedMotion], step: float, rule: str, world: str = "IA
     return float(np.median([error_of(motion, 1e-3 * step, rule, world) for motion in motions]))
 
 
-def _targets(table: Table) -> Iterator[Part]:
-    """Yield the target: impacts at the touch are nearer to the truth in every motion."""
-    yield Part.on("motions that impacts at the touch make worse", table.holds.count(False), 0)
-
-
 TOUCH = Check(
     key="touch",
     question="How much nearer to its truth is a motion whose impacts happen at the moment of touch?",
     cases=lambda study: MOTIONS,
     row=_rows,
     holds=lambda row: bool(row["error, impacts at the touch"] < row["error, impacts at the step"]),
-    targets=_targets,
+    targets=no_row_fails("motions that impacts at the touch make worse"),
 )

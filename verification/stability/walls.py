@@ -15,6 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import expm
 
 from reference import Floats
 
@@ -25,8 +26,6 @@ PAPER_DAMPING = 50.0  # B of the paper's walls [N s/m]
 SETTLED_SPEED = 1e-3  # [m/s] as in the claims: a hundredth of the speed at contact
 # neither rounding nor the hand alone explains speeds above this multiple of the initial speed
 GROWN = 1.05
-# for smaller c, T − φ suffers from cancellation, and three terms of the series err by c³/6 < 2e-13
-_SMALL = 1e-4
 _LAST = 0.25  # share of the time, at its end, in which a settled mass must be still
 
 # Emulated encoder with a resolution of 1 µm, and a delay of one sample each way, as in the report's
@@ -111,18 +110,12 @@ def touch_walls(loop: Loop, stiffness: Floats, damping: Floats, law: str) -> Flo
 
 
 def _held_force(loop: Loop) -> tuple[float, float, float]:
-    """Return E, φ, ψ of the exact step v⁺ = E v + φ a, x⁺ = x + φ v + ψ a with c = bT/m, E =
-    exp(−c)."""
-    T = loop.step
-    c = loop.device_damping * loop.step / loop.mass
-    if c < _SMALL:
-        return (
-            1.0 - c + 0.5 * c * c,
-            T * (1.0 - c / 2.0 + c * c / 6.0),
-            T * T * (0.5 - c / 6.0 + c * c / 24.0),
-        )
-    phi = -np.expm1(-c) / c * T
-    return float(np.exp(-c)), float(phi), float((T - phi) * T / c)
+    """Return E, φ, ψ of the exact step v⁺ = E v + φ a, x⁺ = x + φ v + ψ a under a held force, from the
+    exponential of its matrix."""
+    slowed = loop.device_damping / loop.mass
+    motion = np.array([[0.0, 1.0, 0.0], [0.0, -slowed, 1.0], [0.0, 0.0, 0.0]])  # of x, v, a
+    step = expm(loop.step * motion)
+    return float(step[1, 1]), float(step[0, 1]), float(step[0, 2])
 
 
 def _settles_after(loop: Loop, positions: Floats, speeds: Floats) -> Floats:

@@ -11,7 +11,7 @@ import pytest
 
 from iapb import RangeError, resolve_frictional_impact, resolve_impact, resolve_impacts
 from iapb.contact.laws import ImpulseAugmented, Penalty
-from iapb.errors import ArgumentError
+from iapb.errors import ArgumentError, IapbError
 from iapb.scene import find_scene, load_scene
 from iapb.system import System
 from tests.given import data_of
@@ -107,6 +107,42 @@ def test_a_result_beyond_doubles_is_named(M: Any, J: Any, v: Any, quantity: str)
     with pytest.raises(RangeError) as caught:
         resolve_impacts([np.eye(2), M], [J, J], [[-1.0, 0.0], v], 1.0)
     assert caught.value.quantity == f"{quantity.replace('velocity', 'velocities')}[1]"
+
+
+SIZES = (5e-324, 1e-310, 1e-160, 1e-30, 1.0, 1e30, 1e160, HUGE)
+
+
+def sized(rng: np.random.Generator, array: Any) -> Any:
+    """Scale an array by one size, or each entry by its own; keep it finite."""
+    shape = array.shape if rng.random() < 0.2 else None
+    with np.errstate(over="ignore", under="ignore"):
+        return np.clip(array * rng.choice(SIZES, size=shape), -HUGE, HUGE)
+
+
+@pytest.mark.parametrize("kind", ["definite", "singular", "indefinite", "asymmetric", "zero"])
+def test_every_finite_input_gives_a_finite_velocity_or_an_error_by_name(kind: str) -> None:
+    rng = np.random.default_rng(len(kind))
+    ended = {"velocity": 0, "error": 0}
+    for _ in range(300):
+        d = int(rng.integers(1, 7))
+        root = rng.normal(size=(d, d))
+        mass = {
+            "definite": root @ root.T + np.eye(d),
+            "singular": np.outer(root[0], root[0]),
+            "indefinite": root + root.T,
+            "asymmetric": root,
+            "zero": np.zeros((d, d)),
+        }[kind]
+        rows = rng.integers(-1, 2, size=(int(rng.integers(0, 2 * d)), d)).astype(float)
+        given = (sized(rng, array) for array in (mass, rows, rng.normal(size=d)))
+        try:
+            velocity = resolve_impact(*given, float(rng.choice([-1.0, 0.0, 0.3, 1.0]))).velocity
+        except IapbError:
+            ended["error"] += 1
+        else:
+            assert velocity.shape == (d,) and np.all(np.isfinite(velocity))
+            ended["velocity"] += 1
+    assert ended["error"] > 0 and (kind != "definite" or ended["velocity"] > 100)
 
 
 @pytest.mark.parametrize("rows", [[], (), np.zeros(0), np.zeros((0, 2))])

@@ -129,4 +129,4 @@ def test_per_body_rows_are_left_out() -> None:
         {"contact.self_collision_rows": "per_body"}
     )
     run = run_world(scene, "IAPB")
-    assert len(run.impacts.step) and impacts_of_run(run, scene) == ()
+    assert len(run.impacts.step) and impacts_of_run(run, scene) == []

@@ -1,5 +1,4 @@
-"""Laws of budgets, device limits and extreme inputs: the engine keeps
-them."""
+"""Laws of budgets and groups: the engine keeps them."""
 
 from __future__ import annotations
 
