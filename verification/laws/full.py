@@ -128,6 +128,7 @@ def _judge_impacts(batch: Batch, resolver: Resolver, seed: int) -> Outcome:
         largest_condition=ENGINE_CONDITION if ours else None,
         unequal_restitution=ours,
         patience=np.inf,
+        search=0,
     )
     counts = tuple(LawCount(one.law) + one for one in report.verdicts)
     found = (Found(one.law, IMPACTS, batch.first, report.test_of(one)) for one in report.found)
