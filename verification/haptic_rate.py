@@ -1,19 +1,17 @@
 """Topic "haptic-rate": times of steps, impacts and motions beside those of others, and their
 targets.
 
-`iapb bench` measures everything one after another. A report takes the tables of QUOTED from the
-claims, so that nothing is measured twice (`quoting`).
+A report takes the tables of CLAIMED from the claims, so that nothing is measured twice (`quoting`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from reference.worlds import run_world
 from verification.check import Check, Study, Topic
 from verification.claims.speed import C19, C22
 from verification.cost import growth, impact_times, robots, steps
@@ -232,12 +230,6 @@ TOPIC = replace(
     times=None,
     numbers=None,
 )
-
-
-def haptic_study(depth: str, progress: Callable[[int, int], None]) -> Finding:
-    """Measure everything one after another, without any other computation of ours at the same
-    time."""
-    return BENCH(run_world, depth, progress)
 
 
 def quoting(found: Finding, others: Iterable[Finding]) -> Finding:
