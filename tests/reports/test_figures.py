@@ -9,6 +9,7 @@ import pytest
 
 from reports.figures import RECIPES
 from reports.figures.condition_map import condition_map
+from reports.figures.corner import _same_9
 from reports.figures.figure import draw
 from reports.figures.numbers import format_number
 from reports.figures.paper import arm_energies
@@ -58,6 +59,13 @@ def test_a_drawing_is_whole_asks_for_nothing_and_takes_the_colours_of_the_page(k
         assert "<style" not in panel.svg and panel.alt and not re.search(r"\bnan\b", panel.svg)
     said = "".join((figure.caption, *figure.said))
     assert len(said) > 80 and "{" not in said
+
+
+def test_what_the_paper_says_of_figure_9_can_be_wrong():
+    lost = {name: {"distance": k} for k, name in enumerate(("pspread", "pscaled", "psaturated"))}
+    assert all(_same_9(lost).values())
+    lost["pscaled"] = {"distance": 4.0}
+    assert list(_same_9(lost).values()) == [False, True]
 
 
 def test_the_landings_are_drawn_with_their_impulses(gallery):
