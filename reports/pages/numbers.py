@@ -109,7 +109,7 @@ def time(microseconds: float) -> str:
 
 def place(value: float, most: float) -> str:
     """Return the place of a value on an axis from 0 to `most`, in percent of its length."""
-    return f"{100.0 * min(max(value / most, 0.0), 1.0):.1f}%"
+    return f"{100.0 * min(max(value / (most or 1.0), 0.0), 1.0):.1f}%"
 
 
 def log_place(value: float, least: float, most: float) -> str:
