@@ -20,9 +20,9 @@ from reference.complementarity.problem import ImpactProblem
 from reference.complementarity.solution import Answer, velocity_scale
 
 _INEQUALITY = 0  # daqp's `sense` of a row
-_ACTIVE_SET = 1e-13  # accuracy for unit rows and unit velocities: a few hundred roundings
-# accuracy where rounding makes opposed, nearly parallel rows contradict each other
-_OPPOSED = 1e-11
+# Accuracies for unit rows and unit velocities, until one has an answer: a few hundred roundings; and
+# coarser ones where rounding makes opposed, nearly parallel rows contradict each other.
+_ACCURACIES = (1e-13, 1e-11, 1e-9)
 _INFINITE = 1e30  # daqp's value for an absent bound
 # accuracy requested for a problem scaled to unit W and b; the reached accuracy is measured
 _PROXQP = 1e-10
@@ -59,7 +59,7 @@ def daqp(rows: Floats, offset: Floats) -> Floats:
     lower /= scale
     upper = np.full(n, _INFINITE)
     sense = np.full(n, _INEQUALITY, dtype=np.int32)
-    for accuracy in (_ACTIVE_SET, _OPPOSED):
+    for accuracy in _ACCURACIES:
         _, _, flag, detail = daqp.solve(
             np.eye(d),
             np.zeros(d),
