@@ -43,6 +43,7 @@ PATIENCE = 600.0  # [s] ten times as long
 CALL_LIMIT = 60.0  # [s]
 SHRINKING = 60.0  # [s] for a counterexample
 LITTLE_TIME = 2.0  # [s] for it where the patience is at its end
+ITERATED = 1e-4  # largest residual that the accuracy of an iteration may explain
 
 
 @dataclass
@@ -229,6 +230,20 @@ class PassivityReport(Report):
             one.case, one.law, self.bounds, self.tested, self.contract, one.earlier, limit
         )
 
+    @property
+    def hint(self) -> str:
+        """What to do if all errors are as small as those of an iteration that ends early."""
+        largest = max((one.largest for one in self.verdicts if not one.passed), default=0.0)
+        if not 0.0 < largest < ITERATED:
+            return ""
+        table = "KIT" if self.contract == "equality" else "ONE_SIDED"
+        return (
+            f"No error is above {largest:.0e}, which an iteration that ends early can explain. "
+            "Widen the tolerances: bounds=dataclasses.replace(verification.laws.bounds."
+            f"{table}, least={ITERATED}, restitution={ITERATED}). "
+            f"Errors below {ITERATED} of v are not noticed then"
+        )
+
     def _text(self) -> str:
         word = "passed" if self.passed else "NOT FINISHED" if not self.broken_laws else "FAILED"
         kind = "" if self.contract == "equality" else f", contract {self.contract}"
@@ -244,6 +259,8 @@ class PassivityReport(Report):
             lines.append(
                 f"  worst case: {worst.law} at {worst.worst.ratio:.2g} of its tolerance, {family}"
             )
+        if self.hint:
+            lines.append(f"  hint: {self.hint}")
         for one in self.found:
             lines += ["", f"{one.title}:", *_shown(one), "", "as a test:", "", self.test_of(one)]
         return "\n".join(lines)

@@ -66,6 +66,15 @@ def test_a_resolver_that_gives_nothing_usable_fails_with_its_complaint(
     )
 
 
+def test_errors_of_an_iteration_get_a_hint_and_others_none() -> None:
+    def iterated(M: Any, J: Any, v: Any, e: Any) -> Any:
+        return sound_resolver(M, J, v, e) * (1.0 + 1e-6)
+
+    assert "least=0.0001" in str(check_passivity(iterated, impacts=10, search=0))
+    assert "hint" not in str(check_passivity(wrong_sign, impacts=10, search=0))
+    assert "hint" not in str(check_passivity(sound_resolver, impacts=10, search=0))
+
+
 def test_unequal_restitution_is_opt_in() -> None:
     """Newton's equalities with a restitution per row: sound while they are equal, and a gain of
     energy when not."""
