@@ -36,7 +36,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "inspect": "Describe a run: scene, law, collisions, energy, effects, provenance and hashes.",
         "certify": "Judge every recorded impact exactly: energy gain, and whether impulses and "
         "velocities are consistent.",
-        "compare": "Compare worlds on SCENE: distances, energy and time.",
+        "compare": "Compare worlds on SCENE: distances, energy, time, and IAPB's impacts with the LCP's.",
         "store": "Check the run and table files below a folder, or simulate its runs again.",
     },
     "Verify": {

@@ -15,11 +15,14 @@ of its own pose.
 
 The reference world runs a second time at half its step; the difference is its own error. Worlds
 whose distances differ by less are not ordered.
+
+The impacts of IAPB are then compared with the velocities of the frictionless LCP.
 """
 
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
@@ -38,10 +41,16 @@ from iapb.scene import Scene, find_scene, load_scene
 from iapb.scene.mechanism import mechanism_of
 from iapb.simulation import INTERRUPTED
 from reference import Floats
+from reference.complementarity.laws import newton_lcp
+from reference.complementarity.problem import ImpactProblem
 from reference.mujoco import MuJoCo
 from reference.worlds import WORLDS, run_world
+from verification.complementarity.agreement import PUSHED, SAME, distances
+from verification.complementarity.of_runs import StruckImpact, impacts_of_run
 from verification.finding import (
+    BEYOND,
     MIXED,
+    NOT_TESTABLE,
     REPRODUCED,
     Failure,
     Finding,
@@ -59,11 +68,13 @@ Series = dict[
 ]  # arrays of quantities over time, by their column; None where a run does not record them
 
 INSTANTS = 1000  # largest number of instants at which worlds are compared
+IMPACTS = 200  # largest number of impacts of IAPB that are compared with the LCP's
 QUESTION = (
     "The scene is simulated in each world. Distances from the reference world are in the kinetic "
     "metric, for the whole "
     "mass: root mean square displacement and velocity of its particles, and the impulse of all "
-    "contacts so far."
+    "contacts so far. "
+    "The impacts of IAPB are then compared with the velocities of the frictionless LCP."
 )
 _UNITS = {"configuration": "m", "velocity": "m/s", "impulse": "N s"}  # of the three distances
 
@@ -111,8 +122,8 @@ def compare_worlds(
     Returns
     -------
     Finding
-        Its tables are "worlds" (one row per world) and "over time". The answer names the closest
-        of the worlds
+        Its tables are "worlds" (one row per world) and "over time". If IAPB is one of the worlds,
+        the answer begins with its impacts beside the LCP's. Then it names the closest of the worlds
         whose runs are complete and trustworthy, unless they differ by less than the reference's own
         error (the difference from itself at half its step), and the others with the reason.
 
@@ -175,6 +186,12 @@ def compare_worlds(
     )
     said += "".join(f"; {name} {why}" for name, why in unfit.items())
     parts = [Part(f"{said}.", MIXED if unfit else REPRODUCED, "runs", fit, len(runs))]
+    headline: list[str] = []
+    if "IAPB" in runs:
+        judging = partial(compare_impacts, runs["IAPB"][0], scene, failures)
+        if judged := attempt("impacts", judging, failures):
+            parts.append(judged)
+            headline.append(judged.sentence)
     finding = finding_of(
         f"worlds of {scene.name}",
         scene.title or scene.name,
@@ -182,7 +199,7 @@ def compare_worlds(
         parts,
         tables,
         failures,
-        _answer(series, own, against, unfit),
+        " ".join([*headline, _answer(runs, series, own, against, unfit)]),
     )
     return replace(
         finding,
@@ -334,6 +351,7 @@ def _unfit(scene: Scene, run: Run) -> str:
 
 
 def _answer(
+    runs: dict[str, Ran],
     series: dict[str, Series],
     own: Series | None,
     against: str,
@@ -368,8 +386,44 @@ def _answer(
             f"Equally close to {against}: {each} mm apart (rms over mass and time), as far "
             f"as it can tell: {known}"
         )
+    ratio = runs[against][1] / runs[closest][1]
+    speed = f"{ratio:.3g} times as fast" if ratio >= 1.0 else f"{1.0 / ratio:.3g} times as slow"
     return (
         f"Closest to {against} is {closest}: {1e3 * nearest:.3g} mm apart (rms over "
         f"mass and time), "
-        f"{1e3 * far[closest]['most']:.3g} mm at most. {known}"
+        f"{1e3 * far[closest]['most']:.3g} mm at most; its step is {speed}. {known}"
     )
+
+
+def compare_impacts(run: Run, scene: Scene, failures: list[Failure]) -> Part | None:
+    """Return the part on IAPB's velocities and those of the LCP, which are equal if all contacts
+    push; None without an impact."""
+    struck = impacts_of_run(run, scene)
+    if not struck:
+        return None
+    alike = [one for one in struck if not one.other_law][:IMPACTS]
+    pairs = [attempt(one.case.family, partial(_apart, one), failures) for one in alike]
+    compared = [pair for pair in pairs if pair is not None]
+    left_out = Counter(one.other_law for one in struck if one.other_law)
+    besides = "".join(f" Not compared: {many} with {why}." for why, many in left_out.items())
+    if unequal := sum(np.ptp(one.case.given_restitution()) > 0.0 for one in alike):
+        besides = f" In {unequal} contacts differ in e: there IAPB uses Poisson's law.{besides}"
+    if not compared:
+        said = f"No impact of IAPB is compared with the LCP.{besides}"
+        return Part(said, NOT_TESTABLE, "motion", role=BEYOND)
+    agree = sum(distance <= SAME for distance, _ in compared)
+    pulled = sum(outside > PUSHED for _, outside in compared)
+    said = (
+        f"IAPB moves as the LCP in {agree} of {len(compared)} impacts; in {pulled} an impulse "
+        f"pulls; largest distance {max(compared)[0]:.2g} |v⁻|.{besides}"
+    )
+    verdict = REPRODUCED if agree == len(compared) else MIXED
+    return Part(said, verdict, "motion", agree, len(compared))
+
+
+def _apart(one: StruckImpact) -> tuple[float, float]:
+    """Return the distances of IAPB's answer from the LCP's velocity, and from impulses that
+    push."""
+    case = one.case
+    problem = ImpactProblem.from_impact(*case.arrays, case.given_restitution())
+    return distances(case, one.velocity, newton_lcp(problem).velocity)

@@ -47,7 +47,7 @@ def compare(
     ] = None,
     json_: Json = False,
 ) -> Answer:
-    """Compare worlds on SCENE: distances, energy and time."""
+    """Compare worlds on SCENE: distances, energy, time, and IAPB's impacts with the LCP's."""
     place = as_json_file(out)
     with stage_progress() as progress:
         found = compare_worlds(

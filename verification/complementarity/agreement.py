@@ -86,9 +86,7 @@ def compare_case(case: ImpactCase) -> dict[str, Any]:
         if case.touching is None
         else np.vstack([case.contact_jacobian, case.touching])
     )
-    distance = case.distance(v, law)
-    pulled = unpushed_share(case.rows.T, change) * float(np.linalg.norm(change))
-    cone = pulled / (case.speed or 1.0)
+    distance, cone = distances(case, v, law)
     extra = _lost(case.u, change) - _lost(case.u, upper @ (law - case.velocity))
     near, far = sorted((distance, cone))
     return {
@@ -103,6 +101,16 @@ def compare_case(case: ImpactCase) -> dict[str, Any]:
         "approaching by the LCP": bool(np.any(rows @ law < -APPROACHING * scale)),
         "outside": _outside(case.rows, change),
     }
+
+
+def distances(case: ImpactCase, velocity: Floats, law: Floats) -> tuple[float, float]:
+    """Return how far v⁺ (d,) is from the law's, and its impulse from {Jᵀp : p >= 0}.
+
+    Both are in the kinetic metric, relative to |v⁻|.
+    """
+    change = case.lower.T @ (velocity - case.velocity)
+    pulled = unpushed_share(case.rows.T, change) * float(np.linalg.norm(change))
+    return case.distance(velocity, law), pulled / (case.speed or 1.0)
 
 
 def _lost(before: Floats, change: Floats) -> float:

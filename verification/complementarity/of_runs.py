@@ -8,6 +8,7 @@ velocity that the run recorded.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -16,12 +17,13 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from iapb import resolve_impact
+from iapb.contact.kernels.contact_set import TOUCHING
 from iapb.errors import IapbError
 from iapb.mechanics.mechanism import Mechanism
 from iapb.run import Run
 from iapb.scene import Scene, find_scene, load_scene
-from iapb.scene.mechanism import mechanism_of
-from iapb.system import system_of
+from iapb.scene.mechanism import restitution_by_pair
+from iapb.system import System
 from reference.worlds import run_world
 from verification.impacts import Floats, ImpactCase
 
@@ -30,12 +32,65 @@ from verification.impacts import Floats, ImpactCase
 _REBUILT = 1e-9
 
 
-def impacts_of_run(run: Run, scene: Scene) -> list[ImpactCase]:
-    """Return the impacts of an IAPB run that (21) resolves, one for each step and contact group that
-    collides.
+class StruckImpact(NamedTuple):
+    """An impact of an IAPB run as a case without friction, and IAPB's answer.
 
-    Impacts with per-body rows, unequal restitution or friction, those scaled by a device limit, and
-    those of a group that collides at several moments of a step are left out.
+    Attributes
+    ----------
+    case : the normal rows of the contacts that collide, with the restitution of each in `unequal`;
+        in `touching` those of the others
+    velocity : (d,) v⁺ of IAPB
+    other_law : why IAPB's answer is not to be compared with the frictionless LCP's, and the setting
+        that changes this; "" if it is
+    """
+
+    case: ImpactCase
+    velocity: Floats
+    other_law: str
+
+
+PER_BODY = "per-body rows (contact.self_collision_rows: relative has the LCP's rows)"
+SCALED = "an impulse scaled by a limit of the device (a larger device.force_limit leaves it whole)"
+RUBBING = "friction (contact.forces: paper leaves it out of impacts)"
+
+
+def impacts_of_run(run: Run, scene: Scene) -> list[StruckImpact]:
+    """Return the impacts of an IAPB run, one for each step and contact group that collides.
+
+    A group that collides at several moments of a step is left out.
+    """
+    system = System(scene)
+    mechanism = system.mechanism
+    approach = scene.contact.approach_velocity
+    rubbing = bool(run.law_settings.get("friction_in_impacts"))
+    per_body = scene.contact.self_collision_rows == "per_body"
+    found = list[StruckImpact]()
+    for number, blow in enumerate(_group_impacts(run, mechanism), 1):
+        if blow.several:
+            continue
+        v = blow.v_minus
+        rows = _rows_of_step(run, mechanism, blow)
+        closing = rows @ v < -approach
+        if not closing.any():
+            continue
+        e, mu = _coefficients(system, run, blow.q, blow.contacts[closing])
+        case = ImpactCase(
+            mechanism.mass_matrix(blow.q),
+            rows[closing],
+            v,
+            float(e[0]),
+            f"impact {number} at {run.time[blow.step]:.4g} s",
+            unequal=e,
+            touching=rows[~closing],
+        )
+        reasons = {PER_BODY: per_body, SCALED: blow.scaled, RUBBING: rubbing and mu.any()}
+        other_law = " and ".join(reason for reason, holds in reasons.items() if holds)
+        found.append(StruckImpact(case, blow.v_plus, other_law))
+    return found
+
+
+def equality_impacts(run: Run, scene: Scene) -> list[ImpactCase]:
+    """Return the impacts of an IAPB run that (21) resolves, with one restitution each.
 
     Raises
     ------
@@ -43,35 +98,43 @@ def impacts_of_run(run: Run, scene: Scene) -> list[ImpactCase]:
         A rebuilt impact does not give the velocity that the run recorded, so the run is not a run
         of this scene.
     """
-    mechanism = mechanism_of(scene)
-    approach = scene.contact.approach_velocity
-    values = system_of(scene).restitutions
-    rubbing = bool(run.law_settings.get("friction_in_impacts")) and scene.largest_friction > 0.0
-    if scene.contact.self_collision_rows == "per_body" or len(values) != 1 or rubbing:
-        return []
     cases = list[ImpactCase]()
-    for blow in _group_impacts(run, mechanism):
-        if blow.scaled or blow.several:
+    for one in impacts_of_run(run, scene):
+        if one.other_law or np.ptp(one.case.given_restitution()) > 0.0:
             continue
-        v = blow.v_minus
-        rows = _rows_of_step(run, mechanism, blow)
-        closing = rows @ v < -approach
-        case = ImpactCase(
-            mechanism.mass_matrix(blow.q),
-            rows[closing],
-            v,
-            float(values[0]),
-            f"scene {run.scene_name}",
-            touching=rows[~closing],
-        )
-        off = np.abs(resolve_impact(*case.arrays, case.restitution).velocity - blow.v_plus).max()
-        if off > _REBUILT * (float(np.abs(v).max()) or 1.0):
+        case = replace(one.case, unequal=None)
+        off = np.abs(resolve_impact(*case.arrays, case.restitution).velocity - one.velocity).max()
+        if off > _REBUILT * (float(np.abs(case.velocity).max()) or 1.0):
             raise IapbError(
-                f"the impact in step {blow.step} of {run.scene_name}, rebuilt from its run, has "
-                "other velocities than recorded; simulate the run again"
+                f"{case.family} of {run.scene_name}, rebuilt from its run, has other velocities "
+                "than recorded; simulate the run again"
             )
         cases.append(case)
     return cases
+
+
+def _coefficients(
+    system: System, run: Run, q: Floats, contacts: NDArray[np.int64]
+) -> tuple[Floats, Floats]:
+    """Return e and mu (k,) of contacts at configuration q, from the shapes that touch there.
+
+    A run records the bodies of a contact, not its shapes: they are those of the nearest contact of
+    these bodies that the geometry gives. A joint's stop has none.
+    """
+    there = system.contacts_at(q, TOUCHING)
+    table = run.contacts
+    e = np.full(len(contacts), system.scene.contact.restitution)
+    mu = np.zeros(len(contacts))
+    for k, m in enumerate(contacts):
+        same = (there.body_a == table.body_a[m]) & (there.body_b == table.body_b[m])
+        if not same.any():
+            continue
+        away = np.linalg.norm(there.point - table.point[m], axis=1)
+        nearest = np.argmin(np.where(same, away, np.inf))
+        pair = np.array([[there.shape_a[nearest], there.shape_b[nearest]]])
+        e[k] = restitution_by_pair(system.scene, pair)[0]
+        mu[k] = system.frictions.by_pair(pair)[0]
+    return e, mu
 
 
 class _GroupImpact(NamedTuple):
@@ -144,4 +207,4 @@ def scene_impacts(name: str, restitution: float | None = None) -> list[ImpactCas
     scene = load_scene(find_scene(name))
     if restitution is not None:
         scene = scene.with_values({"contact.restitution": restitution})
-    return impacts_of_run(run_world(scene, "IAPB"), scene)
+    return equality_impacts(run_world(scene, "IAPB"), scene)

@@ -19,7 +19,7 @@ from verification.check import Study
 from verification.complementarity import agreement as study
 from verification.complementarity.families import random_cases, two_contacts
 from verification.complementarity.landings import LANDINGS
-from verification.complementarity.of_runs import impacts_of_run
+from verification.complementarity.of_runs import equality_impacts
 from verification.complementarity.piles import PILES
 from verification.finding import REFUTED, REPRODUCED
 from verification.impacts import ImpactCase
@@ -121,7 +121,7 @@ def test_a_run_that_does_not_belong_to_its_scene_is_refused() -> None:
     run = run_world(scene, "IAPB")
     wrong = replace(run, impacts=replace(run.impacts, v_plus=0.5 * run.impacts.v_plus))
     with pytest.raises(IapbError, match="rebuilt from its run"):
-        impacts_of_run(wrong, scene)
+        equality_impacts(wrong, scene)
 
 
 def test_per_body_rows_are_left_out() -> None:
@@ -129,4 +129,4 @@ def test_per_body_rows_are_left_out() -> None:
         {"contact.self_collision_rows": "per_body"}
     )
     run = run_world(scene, "IAPB")
-    assert len(run.impacts.step) and impacts_of_run(run, scene) == []
+    assert len(run.impacts.step) and equality_impacts(run, scene) == []

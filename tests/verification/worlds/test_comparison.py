@@ -1,4 +1,5 @@
-"""Worlds on one scene: distances are those of closed forms, what fails is named."""
+"""Worlds on one scene: distances are those of closed forms, what fails is named, impacts are
+compared with the LCP."""
 
 from __future__ import annotations
 
@@ -9,9 +10,10 @@ import numpy as np
 import pytest
 
 from iapb.errors import IapbError, SolverError
-from iapb.scene import load_scene
+from iapb.scene import Scene, load_scene
 from reference.worlds import run_world
 from verification import compare_worlds, worlds
+from verification.complementarity.of_runs import RUBBING, impacts_of_run
 from verification.finding import MIXED, NOT_COMPUTED
 
 HERE = Path(__file__).parent
@@ -114,3 +116,42 @@ def test_worlds_that_stop_early_or_are_not_to_be_trusted_are_not_ranked(monkeypa
     assert (part.verdict, part.held, part.decided) == (MIXED, 2, 4)
     alone = compare_worlds(short, ["IAPB", "PB"], "PB")
     assert "the reference PB stopped" in alone.answer
+
+
+# Two balls fall on walls of their own; the second also on one without friction.
+BALLS = Scene.model_validate(
+    {
+        "name": "balls",
+        "rate": 1000,
+        "duration": 0.05,
+        "bodies": [
+            {
+                "name": name,
+                "joint": "planar",
+                "mass": 1.0,
+                "inertia": 4e-3,
+                "shapes": [{"kind": "circle", "radius": 0.1}],
+                "position": [x, 0.11, 0.0],
+                "velocity": [0.3, -1.0, 0.0],
+            }
+            for name, x in (("left", -0.5), ("right", 0.5))
+        ],
+        "walls": [
+            {"name": "soft", "kind": "box", "size": [1, 1], "center": [-0.5, -0.5]}
+            | {"restitution": 0.2, "friction": 0.4},
+            {"name": "hard", "kind": "box", "size": [1, 1], "center": [0.5, -0.5]}
+            | {"restitution": 0.9, "friction": 0.0},
+        ],
+    }
+)
+
+
+def test_each_impact_is_compared_with_its_own_restitution_and_without_friction():
+    one, other = impacts_of_run(run_world(BALLS, "IAPB"), BALLS)
+    assert (one.case.restitution, other.case.restitution) == (0.2, 0.9)
+    assert (one.other_law, other.other_law) == (RUBBING, "")
+    found = compare_worlds(BALLS, ["IAPB"], "IAPB")
+    assert "moves as the LCP in 1 of 1 impacts; in 0 an impulse pulls" in found.answer
+    assert f"Not compared: 1 with {RUBBING}." in found.answer
+    paper = BALLS.with_values({"contact.forces": "paper"})
+    assert "in 2 of 2 impacts" in compare_worlds(paper, ["IAPB"], "IAPB").answer
