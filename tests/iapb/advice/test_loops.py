@@ -128,13 +128,6 @@ def test_a_loop_that_grows_is_named_before_and_after_its_run_and_what_is_said_he
     assert coupled(calm) == [] and run_coupled(calm).distrust == ()
 
 
-@pytest.mark.parametrize("name", GIVEN["calm"])
-def test_a_loop_that_is_calm_is_neither_warned_of_nor_doubted(name: str) -> None:
-    scene = scene_of("slider", **GIVEN["calm"][name]["set"])
-    assert coupled(scene) == [] and run_coupled(scene).distrust == ()
-    assert coupled(scene.with_values(GIVEN["calm"][name]["without"]))
-
-
 def test_a_wall_that_is_too_stiff_is_blamed_itself_and_not_the_coupling() -> None:
     stiff = {"forces": "paper", "stiffness": 1e6, "damping": 20.0}
     scene = scene_of("slider", contact=stiff, couplings=gains(100, 5))
@@ -164,3 +157,110 @@ def test_sensors_too_coarse_for_the_gains_are_named_with_the_resolution_to_set(
     assert all(said in one.text for one in found), found
     speed = float(np.abs(run_coupled(scene).device_v[-200:]).max())  # at rest against the wall
     assert (speed > 0.03) == bool(said), speed
+
+
+# Random loops: what blows up was warned of, and little else was
+
+# s: the hand presses, wanders freely, and presses again
+PRESSED = 16.0
+FREE = 8.0
+
+
+def random_scene(rng: np.random.Generator) -> Scene:
+    """A tool of one coordinate before a wall; gains, rate, delay, sensors, wall and hand are
+    drawn."""
+
+    def between(low: float, high: float) -> float:
+        return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+    mass = between(0.05, 3.0)
+    K = between(10.0, 2e4)
+    B = between(0.02, 3.0) * 2.0 * np.sqrt(0.5 * K * mass)
+    push = mass * between(1.0, 10.0)
+    contact: dict[str, Any] = {"restitution": float(rng.choice([0.0, 0.0, 0.5]))}
+    if rng.random() < 0.3:
+        stiffness = between(600.0 * push, 6000.0 * push)
+        damping = between(1.0, 50.0)
+        contact |= {"forces": "paper", "stiffness": stiffness, "damping": damping}
+    kind = str(rng.choice(["four_channel", "unilateral"]))
+    rate = float(rng.choice([250, 500, 1000, 2000, 4000]))
+    device = {
+        "delay": int(rng.choice([0, 0, 0, 1, 2, 5, 10])),
+        "damping": [float(rng.choice([0.0, 0.0, between(0.1, 10.0)]))],
+        "position_resolution": [float(rng.choice([0.0, 0.0, 1e-6, 1e-5, 1e-4]))],
+    }
+    away = float(np.sqrt(0.04 * mass / push))  # time to move by 20 mm
+    turns = [
+        (0.0, -push),
+        (PRESSED, push),
+        (PRESSED + away, -push),
+        (PRESSED + 2.0 * away, 0.0),
+        (PRESSED + FREE, -push),
+    ]
+    rows = []
+    for time, force in turns:  # a jump lasts a microsecond
+        rows += [[time, rows[-1][1], 0, 0]] if rows else []
+        rows.append([time + 1e-6 * bool(time), force, 0, 0])
+    return scene_of(
+        "slider",
+        rate=rate,
+        duration=2.0 * PRESSED + FREE,
+        bodies__tool__mass=mass,
+        contact=contact,
+        device=device,
+        couplings=gains(K, B, kind),
+        hand={"body": "tool", "force_table": rows},
+    )
+
+
+def blows_up(run: Run, scene: Scene) -> bool:
+    """Whether the device swings on at the end of a phase, by a fifth of the speed of its approach,
+    and no less than before."""
+    if not run.complete:
+        return True
+    assert scene.hand is not None
+    push = scene.hand.largest_force()
+    approach = np.sqrt(0.04 * push / scene.bodies[0].mass)
+    speed = np.abs(run.device_v[:, 0])
+    apart = np.abs(run.device_v[:, 0] - run.v[:, 0])
+    for values, start, stop in (
+        (speed, 0.0, PRESSED),
+        (apart, PRESSED + 1.0, PRESSED + FREE),
+        (speed, PRESSED + FREE, scene.duration),
+    ):
+        early, late = (
+            float(
+                values[int((start + a * (stop - start)) * scene.rate) :][
+                    : int(0.1 * (stop - start) * scene.rate)
+                ].max()
+            )
+            for a in (0.3, 0.9)
+        )
+        if late > 30.0 * approach or late > 0.2 * approach and late > 0.9 * early:
+            return True
+    return False
+
+
+@pytest.mark.parametrize(
+    ("seed", "count"),
+    [(22, 20), pytest.param(21, 100, marks=pytest.mark.thorough)],
+)
+def test_random_loops_that_blow_up_were_warned_of_and_few_others(seed: int, count: int) -> None:
+    rng = np.random.default_rng(seed)
+    missed = []
+    warned = 0
+    calm = 0
+    doubted = 0
+    for i in range(count):
+        scene = random_scene(rng)
+        said = coupled(scene)
+        run = run_coupled(scene)
+        if blows_up(run, scene):
+            missed += [] if said else [i]
+        else:
+            calm += 1
+            warned += bool(said)
+            doubted += bool(any("coupling" in why for why in run.distrust) and not said)
+    assert missed == [] and 0.4 * count < calm < 0.95 * count
+    # a small swing that lasts may be doubted all the same: the coupling feeds it
+    assert warned <= 0.05 * calm + 0.5 and doubted <= 0.05 * count
