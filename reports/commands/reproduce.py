@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -22,7 +23,7 @@ from reports.evidence.runs import (
     tilted_runs,
 )
 from reports.figures import RECIPES
-from reports.figures.figure import TEXTS, draw
+from reports.figures.figure import TEXTS, Recipe, draw
 from reports.pages.builder import build_report, draw_all, figure_inputs, figure_page
 from reports.pages.first import count_claims
 from reports.pages.records import FailedCases
@@ -30,6 +31,7 @@ from reports.report import write_companions, write_report
 from reports.runner import Runner
 from reports.show import Answer, Json, stage_progress
 from reports.store.io import write_whole
+from reports.uses import parsed
 from verification.finding import REPRODUCED, Failure, Finding
 
 
@@ -44,6 +46,14 @@ def reproduce(
     figure: Annotated[
         str | None, typer.Option(help="Write one figure's drawings only (such as fig07) as SVG.")
     ] = None,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            help="With --figure: change a value of the figure's scenes, as in iapb run: "
+            "contact.friction=0.3. Repeatable.",
+        ),
+    ] = None,
     json_: Json = False,
 ) -> Answer:
     """Regenerate the report; cached results are reused."""
@@ -54,7 +64,9 @@ def reproduce(
         needed(package, "iapb reproduce")
     depth = "full" if full else "quick"
     if figure is not None:
-        return _write_figure(figure, out, depth)
+        return _write_figure(figure, out, depth, set_ or [])
+    if set_:
+        raise ArgumentError("--set", " ".join(set_), "a figure whose scenes it changes: --figure")
     return make_report(out, depth)
 
 
@@ -115,9 +127,12 @@ def _failure_lines(failed: Sequence[FailedCases]) -> Iterator[str]:
         yield f"    tracebacks: {one.file}"
 
 
-def _write_figure(key: str, out: Path, depth: str) -> Answer:
+def _write_figure(key: str, out: Path, depth: str, changes: list[str]) -> Answer:
     """Write each panel of a figure as a drawing, and a page with all of it; compute only the needed
-    inputs."""
+    inputs.
+
+    `changes` are values of the figure's scenes, as KEY=VALUE; the title and the files then say so.
+    """
     recipes = {recipe.key: recipe for recipe in RECIPES}
     if key not in recipes:
         listed = (f"{name} ({TEXTS[name]['title']})" for name in recipes)
@@ -125,8 +140,15 @@ def _write_figure(key: str, out: Path, depth: str) -> Answer:
         meant = f"; did you mean {near}?" if near else ""
         raise ArgumentError("--figure", key, f"one of {', '.join(listed)}{meant}")
     with stage_progress() as progress:
-        inputs, failed = _inputs(recipes[key].needs, out, depth, progress)
-    drawn = draw(recipes[key], inputs)
+        inputs, failed = _inputs(recipes[key], out, depth, parsed(changes), progress)
+    undrawn: list[Failure] = []
+    drawn = draw(recipes[key], inputs, undrawn if changes else None)
+    for failure in undrawn:
+        expected = f"values with which {key} can be drawn: {failure.error}: {failure.reason}"
+        raise ArgumentError("--set", " ".join(changes), expected)
+    if changes:
+        drawn = replace(drawn, title=f"{drawn.title}, with {', '.join(changes)}")
+        key = f"{key}-changed"
     if not drawn.panels:
         raise ArgumentError(
             "--figure", key, f"a figure whose inputs exist; missing: {', '.join(drawn.missing)}"
@@ -144,22 +166,33 @@ def _write_figure(key: str, out: Path, depth: str) -> Answer:
     return Answer({"drawings": drawings, "page": page, "failed": failed}, lines, int(bool(failed)))
 
 
+def _shows_scenes(recipe: Recipe) -> bool:
+    """Whether the figure is drawn from runs and scenes only, so that it needs no other evidence."""
+    return bool(recipe.needs) and all(
+        name in (*FIGURE_RUNS, TILTED, CORNER_SCENE) for name in recipe.needs
+    )
+
+
 def _inputs(
-    needs: Sequence[str], out: Path, depth: str, progress: Any
+    recipe: Recipe, out: Path, depth: str, values: dict[str, Any], progress: Any
 ) -> tuple[Mapping[str, Any], tuple[FailedCases, ...]]:
     """Return the inputs of a figure and the failed cases. If runs and scenes do not suffice,
     compute all evidence."""
-    if not all(name in (*FIGURE_RUNS, TILTED, CORNER_SCENE) for name in needs):
+    needs = recipe.needs
+    if values and not _shows_scenes(recipe):
+        able = ", ".join(each.key for each in RECIPES if _shows_scenes(each))
+        raise ArgumentError("--set", recipe.key, f"a figure that shows scenes: {able}")
+    if needs and not _shows_scenes(recipe):
         evidence = gather(out, depth, progress)
         return figure_inputs(evidence), evidence.failed
     runner = Runner(out / "runs")
     found = dict[str, Any]()
     for done, name in enumerate(needs, 1):
         if name in FIGURE_RUNS:
-            found[name] = figure_run(runner, name)
+            found[name] = figure_run(runner, name, values)
         elif name == TILTED:
-            found[name] = tilted_runs(runner)
+            found[name] = tilted_runs(runner, values)
         else:
-            found[name] = corner_scene()
+            found[name] = corner_scene(values)
         progress("runs of the figure", done, len(needs))
     return found, ()

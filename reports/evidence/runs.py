@@ -60,16 +60,18 @@ def figure_runs(
     return runs
 
 
-def figure_run(runner: Runner, name: str) -> Run:
-    """Return the run in FIGURE_RUNS with this name, computed or read."""
+def figure_run(runner: Runner, name: str, changed: dict[str, Any] | None = None) -> Run:
+    """Return the run in FIGURE_RUNS with this name, computed or read; `changed` are more values."""
     scene, values, world, rendering = FIGURE_RUNS[name]
-    return runner(shipped_scene(scene, values), world, rendering)
+    return runner(shipped_scene(scene, values | (changed or {})), world, rendering)
 
 
-def tilted_runs(runner: Runner) -> dict[float, dict[str, Run]]:
+def tilted_runs(
+    runner: Runner, changed: dict[str, Any] | None = None
+) -> dict[float, dict[str, Run]]:
     """Return the runs of the peg in the corner by tilt [rad] and world; claim C10 uses the same
     runs."""
-    scene = shipped_scene("peg_corner")
+    scene = shipped_scene("peg_corner", changed)
     with runner.recording(TILTED):
         return {
             tilt: {world: runner(Condition(tilt).place(scene), world) for world in IGNORED}
@@ -77,6 +79,6 @@ def tilted_runs(runner: Runner) -> dict[float, dict[str, Run]]:
         }
 
 
-def corner_scene() -> dict[str, Any]:
+def corner_scene(changed: dict[str, Any] | None = None) -> dict[str, Any]:
     """Return the resolved scene of the peg in the corner."""
-    return shipped_scene("peg_corner").resolved()
+    return shipped_scene("peg_corner", changed).resolved()

@@ -122,6 +122,12 @@ REFUSED = [  # status, command line, what the refusal says
     (1, "sweep corner_tlt", "did you mean corner_tilt?"),
     (1, "prove theorem1", "did you mean theorem_1?"),
     (1, "reproduce --figure fig7", "did you mean fig07?"),
+    (1, "reproduce --set contact.friction=0.2", "a figure whose scenes it changes"),
+    (
+        1,
+        "reproduce --figure motions --set contact.friction=0.2",
+        "a figure that shows scenes: hero, fig04",
+    ),
     (1, "report diff here there", "report = 'here'"),
     (1, "bench --budget 50", "budget = '50': expected a time with its unit, e.g. 50us"),
     (1, "effects peg_corner --measure --world ideal", "--measure needs a world of the compiled"),
@@ -303,6 +309,16 @@ def test_bench_names_the_methods_for_a_budget_or_says_that_there_is_none(iapb, a
     assert found[0] in iapb(*bench)[1]
     found.clear()
     assert "In 2 ms no method solves 7 contacts on 6 coordinates" in iapb(*bench)[1]
+
+
+def test_a_figure_of_changed_scenes_says_so_and_leaves_the_papers_figure(iapb, here):
+    figure = ("reproduce", "--figure", "fig12", "--out", "drawn")
+    assert iapb(*figure)[0] == 0 == iapb(*figure, "--set", "bodies.peg.mass=4")[0]
+    ours, papers = (
+        (here / "drawn" / f"fig12{name}-0.svg").read_text() for name in ("-changed", "")
+    )
+    assert ours != papers
+    assert "with bodies.peg.mass=4" in (here / "drawn" / "fig12-changed.html").read_text()
 
 
 def test_compare_puts_worlds_on_one_page_and_stores_them_with_their_figure(iapb, here):

@@ -128,6 +128,13 @@ def test_a_loop_that_grows_is_named_before_and_after_its_run_and_what_is_said_he
     assert coupled(calm) == [] and run_coupled(calm).distrust == ()
 
 
+@pytest.mark.parametrize("name", GIVEN["calm"])
+def test_a_loop_that_is_calm_is_neither_warned_of_nor_doubted(name: str) -> None:
+    scene = scene_of("slider", **GIVEN["calm"][name]["set"])
+    assert coupled(scene) == [] and run_coupled(scene).distrust == ()
+    assert coupled(scene.with_values(GIVEN["calm"][name]["without"]))
+
+
 def test_a_wall_that_is_too_stiff_is_blamed_itself_and_not_the_coupling() -> None:
     stiff = {"forces": "paper", "stiffness": 1e6, "damping": 20.0}
     scene = scene_of("slider", contact=stiff, couplings=gains(100, 5))
