@@ -47,9 +47,8 @@ class Record(NamedTuple):
     used: np.ndarray  # (3,) int64: steps, contacts and impacts written so far
     steps: Any  # n lines, with the states at the *end* of each step
     contacts: Any  # n c lines
-    impacts: (
-        Any  # n m lines, one per island and impact; the time is that since the start of the step
-    )
+    # n m lines, one per island and impact; the time is that since the start of the step
+    impacts: Any
 
 
 def make_record(steps: int, coordinates: Coordinates, contacts: int, impacts: int) -> Any:

@@ -173,14 +173,12 @@ class Run:
     coordinate_names: tuple[str, ...]  # (nq,)
     coordinate_units: tuple[str, ...]  # (nq,)
     velocity_names: tuple[str, ...]  # (d,), also for generalized forces and impulses
-    velocity_units: tuple[
-        str, ...
-    ]  # (d,) m/s or rad/s; forces have N or N m, impulses N s or N m s
+    # (d,) m/s or rad/s; forces have N or N m, impulses N s or N m s
+    velocity_units: tuple[str, ...]
     body_names: tuple[str, ...]
     tool_dofs: tuple[int, int]  # start, stop of the tool in v; (0, 0) without a hand
-    tool_coordinates: tuple[
-        int, int
-    ]  # start, stop of the tool in q: a quaternion has more entries than its velocity
+    # start, stop of the tool in q: a quaternion has more entries than its velocity
+    tool_coordinates: tuple[int, int]
 
     time: Floats  # (n + 1,) [s]
     q: Annotated[Floats, quantity("time coordinate", POSITION, "generalized configuration")]
@@ -230,9 +228,8 @@ class Run:
     stopped: str = ""  # why an incomplete run was stopped; empty for a complete one
     remarks: tuple[str, ...] = ()  # remarks on values chosen for the scene
     # why the result is not to be trusted (`iapb.advice.distrust`); empty if nothing is wrong
-    distrust: tuple[str, ...] = field(
-        default_factory=tuple
-    )  # no default of the class, which would hide a Later
+    # no default of the class, which would hide a Later
+    distrust: tuple[str, ...] = field(default_factory=tuple)
     # N: of a long run, every N-th step is recorded, and each step with an impact (`iapb.thinning`)
     every: int = 1
 

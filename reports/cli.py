@@ -118,9 +118,8 @@ def _answering(command: Callable[..., Any]) -> Callable[..., int]:
             answer = command(*arguments, **options)
         except KeyboardInterrupt:
             raise typer.Abort from None
-        print(
-            harmless(answer.text(options.get("json_", False))), flush=True
-        )  # colours of files do not pass, too
+        # colours of files do not pass, too
+        print(harmless(answer.text(options.get("json_", False))), flush=True)
         return int(answer.status)
 
     return call

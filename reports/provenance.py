@@ -62,9 +62,8 @@ def current_command() -> str:
         return f"{option}{equals}{path.name}" if path.is_absolute() or ".." in path.parts else word
 
     program = Path(sys.argv[0])
-    name = (
-        "iapb" if program.resolve() == _ROOT / "reports" / "cli.py" else program.name
-    )  # as python -m reports.cli
+    # as python -m reports.cli
+    name = "iapb" if program.resolve() == _ROOT / "reports" / "cli.py" else program.name
     return shlex.join([name or "python", *map(portable, sys.argv[1:])])
 
 

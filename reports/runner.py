@@ -35,9 +35,8 @@ class Runner:
         self.store = RunStore(folder)
         self.progress = progress
         self.used: dict[str, StoredFile] = {}  # by file name, in the order of use
-        self.files: set[str] = (
-            set()
-        )  # of all runs used so far, inside and outside of an open `recording`
+        # of all runs used so far, inside and outside of an open `recording`
+        self.files: set[str] = set()
         self.user = ""  # the user recorded for the runs requested now
         self._held: dict[str, tuple[Run, RunEntry]] = {}
         self._known: dict[str, StoredFile] = {}

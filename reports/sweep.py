@@ -39,9 +39,8 @@ COLUMNS = {
     "error": "",
 }
 Values = Annotated[tuple[Number | Truth | Text, ...], Field(min_length=1)]
-Word = Annotated[
-    str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]{0,199}$")
-]  # leads to no other folder
+# leads to no other folder
+Word = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]{0,199}$")]
 
 
 class Study(ScenePart):

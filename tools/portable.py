@@ -52,11 +52,8 @@ TESTS = (
 # 4e-12 m in the plane. The smallest length in a verdict is a penetration of 1e-4 m, ten thousand
 # times as large as the tolerance.
 Q_TOLERANCE = 1e-8
-JUDGED = (
-    "outcome",
-    "holds",
-    "law",
-)  # columns with verdicts: of findings and cases, of single trials, of other engines
+# columns with verdicts: of findings and cases, of single trials, of other engines
+JUDGED = ("outcome", "holds", "law")
 IMPACTS = 200
 Q = "trajectory/q"
 BLAS = {

@@ -29,9 +29,8 @@ from iapb.scene.reading import scene_from_values
 from iapb.system import system_of
 from reference.exact import relative_energy_gain
 
-Batch = tuple[
-    Floats, Floats, Floats, Floats | None
-]  # M (n or 1, d, d), v⁻, v⁺ (n, d), and M (v⁺ − v⁻) as recorded
+# M (n or 1, d, d), v⁻, v⁺ (n, d), and M (v⁺ − v⁻) as recorded
+Batch = tuple[Floats, Floats, Floats, Floats | None]
 
 EXPORT_HEAD = "iapb impacts 2"  # first line of a file of exported impacts
 _CHECKED = 100  # integers confirm one in so many of the impacts that the bound decides
@@ -279,9 +278,8 @@ def certify(run: Run) -> Certificate:
 
     found = _certificate(batches())
     total, span, restitution = np.fmax.reduce(residuals).tolist()
-    every_row = bool(
-        np.all(run.impacts.rank[:] >= run.impacts.rows[:])
-    )  # else some depend on others
+    # else some depend on others
+    every_row = bool(np.all(run.impacts.rank[:] >= run.impacts.rows[:]))
     judged = run.law == ImpulseAugmented().name and every_row and not np.isnan(restitution)
     return replace(
         found, span=span, restitution=restitution, total=total, restitution_judged=judged
@@ -295,9 +293,8 @@ def _pieces(run: Run, step: Integers) -> Iterator[Any]:
     first = 0
     while first == 0 or first < len(run.impulse):
         offsets = np.asarray(run.contacts.offsets[first : first + steps + 1])
-        few = max(
-            int(np.searchsorted(offsets, offsets[0] + _ROWS, side="right")) - 1, 1
-        )  # contacts are bounded, too
+        # contacts are bounded, too
+        few = max(int(np.searchsorted(offsets, offsets[0] + _ROWS, side="right")) - 1, 1)
         offsets = offsets[: few + 1]
         last = first + max(len(offsets) - 1, 1)
         hits = np.searchsorted(step, (first, first + len(offsets) - 1))

@@ -63,9 +63,8 @@ from verification.table import Row, table_from
 
 Progress = Callable[[str, int, int], None]
 Ran = tuple[Run, float]  # a run, and the processor time per step [s] without set-up
-Series = dict[
-    str, Any
-]  # arrays of quantities over time, by their column; None where a run does not record them
+# arrays of quantities over time, by their column; None where a run does not record them
+Series = dict[str, Any]
 
 INSTANTS = 1000  # largest number of instants at which worlds are compared
 IMPACTS = 200  # largest number of impacts of IAPB that are compared with the LCP's

@@ -46,9 +46,8 @@ class Shapes(NamedTuple):
     radius: Floats  # (n,) [m] of a circle or sphere, else 0
     first: Indices  # (n,) row of `vertices` where the shape begins
     count: Indices  # type: ignore[assignment]  # (n,) rows: half-plane 2, circle 1, polygon >= 3, in space 0
-    vertices: (
-        Floats  # (m, 2) [m]; half-plane: point, unit outward normal; circle: centre; polygon: CCW
-    )
+    # (m, 2) [m]; half-plane: point, unit outward normal; circle: centre; polygon: CCW
+    vertices: Floats
     center: Floats  # (n, 3) [m] of a circle, sphere or box, point of a half-space; else 0
     # (n, 3, 3) box: its axes as columns; half-space: column 2 is the unit outward normal
     axes: Floats
@@ -71,17 +70,15 @@ class ContactBuffer(NamedTuple):
     body_a: Annotated[Indices, "contact"]  # moving body that the normal points into
     body_b: Annotated[Indices, "contact"]  # other body, -1 = the static world
     feature: Annotated[Integers, "contact"]  # which vertex and edge touch; stable while they do
-    point: Annotated[
-        Floats, "contact 3"
-    ]  # [m] world, midway between the two surfaces along the normal
+    # [m] world, midway between the two surfaces along the normal
+    point: Annotated[Floats, "contact 3"]
     normal: Annotated[Floats, "contact 3"]  # unit, from b into a
     gap: Annotated[Floats, "contact"]  # [m] negative = overlap
     is_new: Annotated[Booleans, "contact"]  # not a contact of the previous step
     collides: Annotated[Booleans, "contact"]  # enters the impact of this step
     normal_velocity: Annotated[Floats, "contact"]  # [m/s] positive separates
-    tangential_velocity: Annotated[
-        Floats, "contact 3"
-    ]  # [m/s] of a relative to b, orthogonal to the normal
+    # [m/s] of a relative to b, orthogonal to the normal
+    tangential_velocity: Annotated[Floats, "contact 3"]
     normal_force: Annotated[Floats, "contact"]  # [N] on a along the normal
     friction_force: Annotated[Floats, "contact 3"]  # [N] on a
     mark: Annotated[States, "contact"]  # scratch of the clustering

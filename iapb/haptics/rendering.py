@@ -44,9 +44,8 @@ class Port(NamedTuple):
     device_body: int  # the same in the device
     hand_point: Annotated[Floats, "3"]  # [m] held point in the body's frame
     wrench: Annotated[Floats, "6"]  # force [N] and torque [N m] of the hand, world axes
-    planned: Annotated[
-        Floats, "planned 6"
-    ]  # the wrench of the coming steps; empty: it does not change
+    # the wrench of the coming steps; empty: it does not change
+    planned: Annotated[Floats, "planned 6"]
     stiffness: Annotated[Floats, "tool"]  # K [N/m, N m/rad]
     damping: Annotated[Floats, "tool"]  # B [N s/m, N m s/rad]
     mechanism: MechanismArrays  # the device: kinematically the tool
@@ -59,22 +58,18 @@ class Port(NamedTuple):
     device_mass: Annotated[Floats, "tool tool"]
     device_lower: Annotated[Floats, "tool tool"]
     device_damping: Annotated[Floats, "tool"]  # physical damping b of the device
-    force_limit: Annotated[
-        Floats, "tool"
-    ]  # [N, N m] to which the actuators clip the commanded force, inf = none
-    resolution: Annotated[
-        Floats, "tool"
-    ]  # [m, rad] of the position sensors, in the tangent where q is no vector
+    # [N, N m] to which the actuators clip the commanded force, inf = none
+    force_limit: Annotated[Floats, "tool"]
+    # [m, rad] of the position sensors, in the tangent where q is no vector
+    resolution: Annotated[Floats, "tool"]
     quantised: bool
-    delayed_force: Annotated[
-        Floats, "slot tool"
-    ]  # ring of actuator forces on their way; one slot: no delay
+    # ring of actuator forces on their way; one slot: no delay
+    delayed_force: Annotated[Floats, "slot tool"]
     delayed_q: Annotated[Floats, "slot tool_coordinate"]  # ring of measured positions on their way
     delayed_v: Annotated[Floats, "slot tool"]
     sensed_q: Annotated[Floats, "tool_coordinate"]  # positions read by the sensors
-    measured_q: Annotated[
-        Floats, "tool_coordinate"
-    ]  # position of the device as the simulation reads it
+    # position of the device as the simulation reads it
+    measured_q: Annotated[Floats, "tool_coordinate"]
     measured_v: Annotated[Floats, "tool"]
     hand_force: Annotated[Floats, "velocity"]  # of the hand on the tool
     device_hand_force: Annotated[Floats, "tool"]  # of the hand on the device

@@ -26,9 +26,8 @@ from verification.scenes.ledger import SCENES, WORTH_NAMING
 from verification.table import HOLDS, Row, Table
 
 CERTIFIED_RUNS = "certified runs"  # the check that needs the runs of all other stages
-WITHOUT_IMPACTS = re.compile(
-    r"-(PB|CBuc|ideal|ideal-friction)-[0-9a-f]+\.h5$"
-)  # names of files that are not even read
+# names of files that are not even read
+WITHOUT_IMPACTS = re.compile(r"-(PB|CBuc|ideal|ideal-friction)-[0-9a-f]+\.h5$")
 FEW = 100  # runs that are certified in this process, which is faster than to start others
 
 

@@ -31,16 +31,13 @@ class Evidence:
 
     inputs: Mapping[str, Any] = field(default_factory=dict)
     claims: tuple[Finding, ...] = ()
-    effects: Mapping[str, Table] = field(
-        default_factory=dict
-    )  # of each scene, as `verification.cost.effects` has them
+    # of each scene, as `verification.cost.effects` has them
+    effects: Mapping[str, Table] = field(default_factory=dict)
     topics: tuple[Finding, ...] = ()  # the first page has the answer of each, in this order
-    numbers: Mapping[str, Mapping[str, Table]] = field(
-        default_factory=dict
-    )  # that pages quote, of what is no topic: see `verification.numbers`
+    # that pages quote, of what is no topic: see `verification.numbers`
+    numbers: Mapping[str, Mapping[str, Table]] = field(default_factory=dict)
     failed: tuple[FailedCases, ...] = ()
     provenance: Mapping[str, str] = field(default_factory=dict)
     runs: tuple[StoredFile, ...] = ()  # that the numbers were computed from
-    seconds: Mapping[str, float] = field(
-        default_factory=dict
-    )  # that each stage took to compute or read
+    # that each stage took to compute or read
+    seconds: Mapping[str, float] = field(default_factory=dict)

@@ -42,12 +42,8 @@ GROUPS: dict[str, tuple[tuple[Quantity, ...], Callable[[Run], Any]]] = {
     "impacts": (quantities(ImpactTable), lambda run: run.impacts),
     "timings": (quantities(Run, "chunk"), lambda run: run),
 }
-RESULT_GROUPS = (
-    "trajectory",
-    "steps",
-    "contacts",
-    "impacts",
-)  # with the energy balance: the content hash
+# with the energy balance: the content hash
+RESULT_GROUPS = ("trajectory", "steps", "contacts", "impacts")
 
 # (group, name, attribute of Run): texts; those of `JSON_TEXTS` are stored as JSON
 TEXTS = (
@@ -62,10 +58,8 @@ TEXTS = (
     ("coupling", "settings", "coupling_settings"),
 )
 JSON_TEXTS = frozenset({"scene_resolved", "law_settings", "coupling_settings"})
-SENTENCES = (
-    "remarks",
-    "distrust",
-)  # lists of sentences, as JSON in attributes of the file; a file may lack them
+# lists of sentences, as JSON in attributes of the file; a file may lack them
+SENTENCES = ("remarks", "distrust")
 
 # attributes of a file by which it is read; others may be added
 ATTRIBUTES = (

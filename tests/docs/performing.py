@@ -128,9 +128,8 @@ def _command(words):
         import pytest
 
         installed = any(point.name == "iapb" for point in entry_points(group="pytest11"))
-        plugin = (
-            [] if installed else ["-p", "pytest_iapb"]
-        )  # as in a checkout that was installed before it had one
+        # as in a checkout that was installed before it had one
+        plugin = [] if installed else ["-p", "pytest_iapb"]
         pytest.main(
             [*plugin, "-p", "no:cacheprovider", "--rootdir", ".", "-c", "/dev/null", *words[1:]]
         )

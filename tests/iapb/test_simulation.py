@@ -40,9 +40,8 @@ PEG = load_scene(find_scene("peg_corner")).with_values(
     }
 )
 CRADLE = load_scene(find_scene("newton_cradle"))
-ARM = load_scene(
-    find_scene("arm_pushing")
-)  # inertia that varies, velocity terms, a group of two trees
+# inertia that varies, velocity terms, a group of two trees
+ARM = load_scene(find_scene("arm_pushing"))
 STEPS = 350  # past the fourth collision of the peg
 COUPLINGS = ("none", "four-channel", "unilateral")
 LAWS = [Penalty(), *(ImpulseAugmented(rendering=rendering) for rendering in RENDERINGS)]

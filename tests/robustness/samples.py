@@ -15,9 +15,8 @@ from reports.store import RunStore, write_run
 from reports.store.records import write_record
 from tests.reference.fclib_files import local_file, matrix_group
 
-TIMES = int(
-    os.environ.get("IAPB_FUZZ", "1")
-)  # how often each fault is done, and a multiple of the wrong inputs
+# how often each fault is done, and a multiple of the wrong inputs
+TIMES = int(os.environ.get("IAPB_FUZZ", "1"))
 
 
 @cache

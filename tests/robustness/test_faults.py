@@ -76,9 +76,8 @@ def full_disk(folder, rng):
     said = folder / "said"
 
     def write_with_limit():
-        signal.signal(
-            signal.SIGXFSZ, signal.SIG_IGN
-        )  # a write past the limit fails, as on a full disk
+        # a write past the limit fails, as on a full disk
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         most = resource.getrlimit(resource.RLIMIT_FSIZE)[1]
         resource.setrlimit(resource.RLIMIT_FSIZE, (limit, most))
         try:

@@ -28,13 +28,8 @@ UNITS = {
     "collision_threshold": "m/s",
     "force_limit": "times the paper's",
 }
-START = (
-    "tilt",
-    "clearance",
-    "travel",
-    "friction",
-    "collision_threshold",
-)  # conditions that most claims vary
+# conditions that most claims vary
+START = ("tilt", "clearance", "travel", "friction", "collision_threshold")
 F_LIMIT = (15.0, 15.0, 1.0)  # [N, N, N m]
 
 # The conditions that each world ignores: one run of a world serves all values of these conditions.

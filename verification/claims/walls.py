@@ -89,13 +89,8 @@ C17 = Check(
 # C20: the bound on the virtual damping
 
 WALL_STIFFNESSES = (250.0, 1000.0, 4000.0, 16000.0)
-DEVICE_DAMPINGS = (
-    0.0,
-    0.5,
-    1.25,
-    2.0,
-    5.0,
-)  # times KT/2: below 1 no wall of this stiffness is passive
+# times KT/2: below 1 no wall of this stiffness is passive
+DEVICE_DAMPINGS = (0.0, 0.5, 1.25, 2.0, 5.0)
 OF_BOUND = (0.0, 0.5, 0.95, 1.05, 2.0)  # times the bound b − KT/2
 EFFORT = 0.1  # of the search of each wall
 

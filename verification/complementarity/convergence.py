@@ -151,9 +151,8 @@ def _require_worth(case: TruthCase, truth: SceneTruth, position: float, velocity
     bound = truth.bound
     last = min(1.0 / rate for rate in FINE)
     _, v = truth.state(np.linspace(0.0, truth.end, 101))
-    jumps = (
-        2.0 * float(np.abs(v).max()) * bound.instant * len(truth.events)
-    )  # L¹ error of late or early jumps
+    # L¹ error of late or early jumps
+    jumps = 2.0 * float(np.abs(v).max()) * bound.instant * len(truth.events)
     worth = bound.position, bound.velocity * case.duration + jumps
     for error, measured in zip(worth, (position, velocity), strict=True):
         if error > max(WORTH * measured, _ROUNDING) * last:
@@ -181,6 +180,7 @@ def _errors(
     return float(np.abs(run.q - q).max() * rate), float(np.abs(run.v - v).sum(axis=0).max())
 
 
+# the scenes of the quick depth
 QUICK = (
     "two_discs",
     "bernoulli_balls",
@@ -189,7 +189,7 @@ QUICK = (
     "peg_hole",
     "arm_pushing",
     "ball_dropped_in_space",
-)  # the scenes of the quick depth
+)
 
 
 CONVERGENCE = Check(

@@ -16,9 +16,8 @@ import numpy as np
 from reference import Floats
 from verification.impacts import ImpactCase
 
-Draw = Callable[
-    [np.random.Generator, int], tuple[Floats, Floats, Floats]
-]  # (rng, redundancy) -> (M, J, v)
+# (rng, redundancy) -> (M, J, v)
+Draw = Callable[[np.random.Generator, int], tuple[Floats, Floats, Floats]]
 
 
 def random_cases(

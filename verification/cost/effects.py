@@ -282,9 +282,8 @@ class Loop(RecordedLoop):
         switches: Iterable[str] = (),
         on: bool = False,
     ) -> None:
-        force = (
-            [0.0] * len(scene.hand.force) if scene.hand is not None else None
-        )  # zeros instead of a hand force
+        # zeros instead of a hand force
+        force = [0.0] * len(scene.hand.force) if scene.hand is not None else None
         values = {name: force if name == "hand.force" else value for name, value in values.items()}
         changed = scene.with_values(values) if values else scene
         law = world.law if impulses else Penalty()

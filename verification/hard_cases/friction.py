@@ -133,9 +133,8 @@ def _block(share: float) -> Scene:
 def pushed(share: float, name: str, expected: str) -> TrajectoryCase:
     """A block on the floor, pushed with this share of μ m g."""
     slide = 0.5 * max(share - 1.0, 0.0) * _MU * _G * _DURATION**2
-    scale = (
-        slide or _CREEP * _DURATION
-    )  # if the block sticks: the distance of a creep at v_threshold
+    # if the block sticks: the distance of a creep at v_threshold
+    scale = slide or _CREEP * _DURATION
 
     def measure(run: Run) -> Measured:
         """Measure the distance from the motion of Coulomb's law, relative to `scale`."""
@@ -161,12 +160,10 @@ _COSINE = 0.6
 _ROUGH = 2.0
 _SPEED = 1.0
 _STIFF = 1e4
-_HEIGHT = (
-    0.5 * _SINE + 1e-6 - 1e-9
-)  # of the centre [m]: an overlap of 1 nm, so that the contact is closed at the start
-_MOBILITY = 1.0 + 3.0 * _COSINE * (
-    _COSINE - _ROUGH * _SINE
-)  # [1/kg] of the sliding contact: negative
+# of the centre [m]: an overlap of 1 nm, so that the contact is closed at the start
+_HEIGHT = 0.5 * _SINE + 1e-6 - 1e-9
+# [1/kg] of the sliding contact: negative
+_MOBILITY = 1.0 + 3.0 * _COSINE * (_COSINE - _ROUGH * _SINE)
 _GROWTH = math.sqrt(-_MOBILITY * _STIFF)  # [1/s] σ: the overlap grows as exp(σ t) at first
 
 
@@ -248,9 +245,8 @@ _STEADY = 0.01  # speed of the ball [m/s]
 _OMEGA = math.sqrt(_PRESS)  # [rad/s] of the plate on the spring, without the damper
 _DECAY = 0.5 * _DAMPED  # [1/s] of its swing
 _SWING = math.sqrt(_OMEGA**2 - _DECAY**2)  # [rad/s] with the damper
-_SLIDING = (
-    _MU * _G / _PRESS
-)  # the spring's depth [m] in steady sliding; the start has 1.5 times this depth
+# the spring's depth [m] in steady sliding; the start has 1.5 times this depth
+_SLIDING = _MU * _G / _PRESS
 # Error of a step Δt in units of ωΔt times the swing V/ω. The force acts at the end of the step, as
 # if the contact had another damper KΔt, so the swing decays faster by ω²Δt/2. It loses ½ω²Δt t
 # exp(−at) of its size, at most ω²Δt/(2 e a), with a the decay rate and e Euler's number. The stick

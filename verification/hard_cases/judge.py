@@ -55,9 +55,8 @@ METHODS = ("factored", WITHOUT_CLAMP, *COMPARED)
 # contribute a few n ε; 1 + e = 2 doubles them. κ is that of M scaled to a unit diagonal, because
 # rounding acts on each component by itself (van der Sluis 1969).
 _MARGIN = 10.0
-_HALF_SUBNORMAL = Fraction(
-    1, 2**1075
-)  # rounding error of subnormal numbers, which no relative bound covers
+# rounding error of subnormal numbers, which no relative bound covers
+_HALF_SUBNORMAL = Fraction(1, 2**1075)
 _FORM_DELASSUS = ("gram_pinv", "gram_cholesky", "damped")
 # The residuals of these methods depend on the LAPACK: 7e-9 to 5e-8 on Kahan's rows, with a
 # tolerance of 1e-8.
@@ -326,9 +325,8 @@ def _unmet(case: HardCase, v_plus: Floats) -> float:
     lower = np.linalg.cholesky(case.mass_matrix)
     scale = np.linalg.norm(np.linalg.solve(lower, J.T), axis=0) * np.linalg.norm(lower.T @ v)
     if np.ndim(case.restitution):
-        unmet = np.maximum(
-            -(J @ after), 0.0
-        )  # Poisson's law: no contact approaches after the impact
+        # Poisson's law: no contact approaches after the impact
+        unmet = np.maximum(-(J @ after), 0.0)
     else:
         unmet = np.abs(J @ after + case.restitution * (J @ v))
     return float(

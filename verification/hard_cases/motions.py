@@ -30,9 +30,8 @@ _RADIUS = 0.1
 _STEPS_LATE = 4.0
 
 _FALL = math.sqrt(2.0 * _HEIGHT / _GRAVITY)  # [s] until the first bounce
-_END_OF_BOUNCES = _FALL * (
-    1.0 + 2.0 * _RESTITUTION / (1.0 - _RESTITUTION)
-)  # [s], the sum of all flights
+# [s], the sum of all flights
+_END_OF_BOUNCES = _FALL * (1.0 + 2.0 * _RESTITUTION / (1.0 - _RESTITUTION))
 
 
 def chatter() -> TrajectoryCase:

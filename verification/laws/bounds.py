@@ -14,9 +14,8 @@ from verification.impacts import EPS, ImpactCase
 
 CEILING_UP_TO = 1e8  # κ(M) of the kit's own draws
 Measure = TypeVar("Measure", bound=Callable[..., Any])
-Found = (
-    tuple[float, float] | None
-)  # value of a residual and its tolerance; None if the law does not apply
+# value of a residual and its tolerance; None if the law does not apply
+Found = tuple[float, float] | None
 
 
 @dataclass(frozen=True)

@@ -129,9 +129,8 @@ def distance_from_cone(case: ImpactCase, target: Floats) -> float:
     if the search ends before it can tell.
     """
     m = 0 if case.tangents is None else case.tangents.shape[1]
-    tangents = case.with_tangents.rows[case.contacts :].reshape(
-        case.contacts, m, case.coordinates
-    )  # T L⁻ᵀ
+    # T L⁻ᵀ
+    tangents = case.with_tangents.rows[case.contacts :].reshape(case.contacts, m, case.coordinates)
     friction = np.zeros(case.contacts) if case.friction is None else case.friction
     fixed = np.repeat(
         np.vstack([np.zeros((1, m)), np.eye(m), -np.eye(m)])[None], case.contacts, axis=0

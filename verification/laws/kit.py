@@ -78,9 +78,8 @@ class LawVerdict(LawCount):
         default_factory=dict, repr=False
     )
     _largest_failure: float = field(default=-np.inf, repr=False)
-    _smallest: tuple[bool, int] = field(
-        default=(True, 0), repr=False
-    )  # whether it is below NOTABLE, and its size
+    # whether it is below NOTABLE, and its size
+    _smallest: tuple[bool, int] = field(default=(True, 0), repr=False)
 
     @property
     def passed(self) -> bool:

@@ -21,9 +21,8 @@ from reference.worlds import run_world
 Values = dict[str, Any]
 
 ROOM = 0.5  # [m] half width of the room
-CELLS = tuple(
-    (x, y) for x in (-0.27, 0.0, 0.27) for y in (-0.27, 0.0, 0.27)
-)  # at most one body starts in each
+# at most one body starts in each
+CELLS = tuple((x, y) for x in (-0.27, 0.0, 0.27) for y in (-0.27, 0.0, 0.27))
 RENDERINGS = ("full", "full", "saturate", "scale", "spread")
 # With √(K/m)·Δt above this, (5) has less than one sample per quarter of its period and the motion
 # diverges.
@@ -220,9 +219,8 @@ def _contact(rng: np.random.Generator, least_mass: float, dt: float) -> Values:
     }
     if rng.random() < 0.4:
         friction = round(rng.uniform(0.05, 1.0), 3)
-        forces = (
-            "paper" if round(1e3 * friction) % 3 == 0 else "implicit"
-        )  # no draw: all other values stay the same
+        # no draw: all other values stay the same
+        forces = "paper" if round(1e3 * friction) % 3 == 0 else "implicit"
         contact |= {"forces": forces, "friction": friction, "friction_velocity": 1e-2}
     if rng.random() < 0.5:
         contact["coherence_distance"] = 1e-2

@@ -92,9 +92,8 @@ def _cases(study: Study) -> Iterator[Case]:
             TREES_SET, f"trees of {n}", "random", [SEED, n], partial(_trees, n, count, tuple(KINDS))
         )
     for kind, n in product(KINDS, KIND_SIZES):
-        kinds = (
-            (kind,) if KINDS[kind].nv else (kind, "revolute")
-        )  # a tree of fixed joints alone has nothing to compare
+        # a tree of fixed joints alone has nothing to compare
+        kinds = (kind,) if KINDS[kind].nv else (kind, "revolute")
         yield Case("joint kinds", f"{n} {kind}", "random", [SEED, n], partial(_trees, n, 1, kinds))
     for path in sorted(SHIPPED.glob("*.yaml")):
         yield Case("scenes", path.stem, "of the scene", SEED, partial(_scene, path))

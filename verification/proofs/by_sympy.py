@@ -33,9 +33,8 @@ _SIGNS = {
     "⁴": "**4",
     "ᵀ": ".transpose()",
 }
-_BETWEEN = re.compile(
-    r"(?<=[\w)])\s*(?<!transpose)(?=\()|(?<=\))\s*(?=\w)|(?<=\w)\s+(?=\w)"
-)  # between two factors
+# between two factors
+_BETWEEN = re.compile(r"(?<=[\w)])\s*(?<!transpose)(?=\()|(?<=\))\s*(?=\w)|(?<=\w)\s+(?=\w)")
 
 
 class Relation(NamedTuple):

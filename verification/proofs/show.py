@@ -69,9 +69,8 @@ class ProofRecord:
     measured: tuple[str, ...]
     problems: tuple[str, ...]
     seconds: float = field(compare=False)
-    sympy: str = (
-        NOT_APPLICABLE  # whether SymPy accepts the proof too: YES, NO, or why there is no answer
-    )
+    # whether SymPy accepts the proof too: YES, NO, or why there is no answer
+    sympy: str = NOT_APPLICABLE
 
     @property
     def holds(self) -> bool:

@@ -106,9 +106,8 @@ class Expression:
     def __str__(self) -> str:
         """Return the sum as text on one line, which the reader reads again."""
         pieces: list[str] = []
-        unit = (
-            [] if self.rows in (ANY, "1") else ["I"]
-        )  # a bare number among matrices is a multiple of the identity
+        # a bare number among matrices is a multiple of the identity
+        unit = [] if self.rows in (ANY, "1") else ["I"]
         for (scalars, word), coefficient in self.ordered():
             counts = [(name, len(list(group))) for name, group in groupby(scalars)]
             factors = [
@@ -197,10 +196,8 @@ class Fact:
         return self.relation == "≥" and not self.difference.is_number
 
     def __str__(self) -> str:
-        identity = self.rhs == ONE and self.lhs.rows not in (
-            ANY,
-            "1",
-        )  # then 1 stands for the identity matrix
+        # then 1 stands for the identity matrix
+        identity = self.rhs == ONE and self.lhs.rows not in (ANY, "1")
         return f"{self.lhs} {self.relation} {'I' if identity else self.rhs}"
 
 

@@ -81,10 +81,8 @@ def touch_walls(loop: Loop, stiffness: Floats, damping: Floats, law: str) -> Flo
     x = np.full(K.shape, -loop.distance)
     v = np.full(K.shape, loop.speed)
     first = np.round(x / r) * r if r > 0.0 else x.copy()
-    readings = [
-        first - loop.speed * loop.step,
-        *[first] * (loop.delay + 1),
-    ]  # those that are delayed, oldest first
+    # those that are delayed, oldest first
+    readings = [first - loop.speed * loop.step, *[first] * (loop.delay + 1)]
     commands = [np.zeros(K.shape) for _ in range(loop.delay)]
     positions, speeds = (np.empty((steps, *K.shape)) for _ in range(2))
     free, moved, held = _held_force(loop)

@@ -36,9 +36,8 @@ class BroadPhase(NamedTuple):
     moving: Indices  # (k,) shapes on moving bodies
     static: Indices  # (n - k,)
     body: Indices  # (n,)
-    allowed: Annotated[
-        States, "shape shape"
-    ]  # for i < j: 1 candidate pair (i, j), 2 candidate pair (j, i), 0 none
+    # for i < j: 1 candidate pair (i, j), 2 candidate pair (j, i), 0 none
+    allowed: Annotated[States, "shape shape"]
     local_center: Annotated[Floats, "shape 3"]  # [m] of the bounding sphere in the body's frame
     radius: Annotated[Floats, "shape"]  # [m], infinite for half-planes and half-spaces
     cell_size: float  # [m] largest diameter of a moving shape

@@ -43,9 +43,8 @@ class ImpactWork(NamedTuple):
     v: Annotated[Floats, "velocity"]  # v⁻
     v_plus: Annotated[Floats, "velocity"]
     momentum: Annotated[Floats, "velocity"]  # generalized impulse M(v⁺ − v⁻)
-    columns: Annotated[
-        Floats, "velocity row"
-    ]  # rows of J as columns, then of A, then their residuals
+    # rows of J as columns, then of A, then their residuals
+    columns: Annotated[Floats, "velocity row"]
     rows: Annotated[Floats, "velocity row"]  # unit rows of A as columns, kept for impulses
     length: Annotated[Floats, "row"]  # lengths of the rows of A
     basis: Annotated[Floats, "velocity velocity"]  # rows are the orthonormal basis Q

@@ -43,18 +43,16 @@ class FrictionWork(NamedTuple):
     p: Annotated[Floats, "tangent"]  # tangential impulses [N s]
     block: Annotated[Floats, "row 3"]  # the entries xx, xy, yy of B_i B_iᵀ [1/kg]
     inertia: Annotated[Floats, "row"]  # its largest eigenvalue
-    response: Annotated[
-        Floats, "tangent"
-    ]  # ∂p_n,i / ∂p_t,i by least norm: effect on its contact's p_n
+    # ∂p_n,i / ∂p_t,i by least norm: effect on its contact's p_n
+    response: Annotated[Floats, "tangent"]
     coefficient: Annotated[Floats, "row"]  # μ
     limit: Annotated[Floats, "row"]  # Coulomb's limit μ p_n [N s]
     change: Annotated[Floats, "row"]  # change of each limit required by a round
     sliding: Annotated[Floats, "row"]  # μ; 0 where the frictionless normal impulse pulls
     without: Annotated[Floats, "row"]  # normal impulses without friction [N s]
     wanted: Annotated[Floats, "row"]  # normal impulses with friction
-    least: Annotated[
-        Floats, "row"
-    ]  # of contacts that only push: smallest velocity after, along unit rows of A
+    # of contacts that only push: smallest velocity after, along unit rows of A
+    least: Annotated[Floats, "row"]
     target: Annotated[Floats, "velocity"]  # Q Δ_n
     left: Annotated[Floats, "velocity"]
     moved: Annotated[Floats, "velocity"]  # Bᵀ p_t
@@ -90,9 +88,8 @@ def add_impact_friction(d, count, rank, work, push, f, only_push, impulses):
         largest = max(largest, before)
         if orthogonalize(row, work.basis, rank, f.normal_part[j]) <= GONE * GONE * before:
             row[:] = 0.0
-    scale = math.sqrt(largest) * math.sqrt(
-        dot_of(u, u)
-    )  # of the rounding of a tangential velocity [m/s]
+    # of the rounding of a tangential velocity [m/s]
+    scale = math.sqrt(largest) * math.sqrt(dot_of(u, u))
     met = settle_friction(count, rank, work, push, f, d, scale, only_push, impulses)
     share = share_within_cone(count, f)
     combine(count, f, d)
@@ -311,9 +308,8 @@ def _start(count, rank, work, push, f, d):
         f.without[i] = length * f.without[i] / work.length[i] if work.length[i] > 0.0 else 0.0
         f.sliding[i] = f.coefficient[i]
         f.limit[i] = 0.0
-    _move_normals(
-        count, rank, work, f, False
-    )  # an active set loads only a few of redundant contacts
+    # an active set loads only a few of redundant contacts
+    _move_normals(count, rank, work, f, False)
     return True
 
 

@@ -79,17 +79,15 @@ class RestWork(NamedTuple):
 
     contact: Annotated[Integers, "contact"]  # contacts of the group
     at: Annotated[Integers, "contact 2"]  # first local coordinate of each of their two trees
-    size: Annotated[
-        Integers, "contact 2"
-    ]  # number of coordinates of these; 0 = no tree, or the first one again
+    # number of coordinates of these; 0 = no tree, or the first one again
+    size: Annotated[Integers, "contact 2"]
     direction: Annotated[Floats, "row 3"]  # of each row: the normal, then the tangents
     rows: Annotated[Floats, "row width"]  # rows of J: one half for each of the two trees
     speed: Annotated[Floats, "row"]  # J v [m/s]
     p: Annotated[Floats, "row"]  # impulses of the step [N s]
     limit: Annotated[Floats, "contact"]  # limits c = μ F_n Δt of friction [N s]
-    bend: Annotated[
-        Floats, "row"
-    ]  # what a contact moved more than Δt J v in the step before, by Δt [m/s]
+    # what a contact moved more than Δt J v in the step before, by Δt [m/s]
+    bend: Annotated[Floats, "row"]
     stiffness: Annotated[Floats, "1"]  # K of the group's contacts [N/m]
     first: Annotated[Integers, "tree"]  # first contact of each group, by its first tree, −1 = none
     next: Annotated[Integers, "contact"]  # contact of the same group that follows, −1 = none
@@ -98,9 +96,8 @@ class RestWork(NamedTuple):
     dof: Annotated[Integers, "velocity"]  # the coordinate v[dof] of each local one
     begin: Annotated[Integers, "velocity"]  # first local coordinate of its tree
     end: Annotated[Integers, "velocity"]  # and the one after the last
-    envelope: Annotated[
-        Integers, "velocity"
-    ]  # first nonzero column of each row of the Newton matrix
+    # first nonzero column of each row of the Newton matrix
+    envelope: Annotated[Integers, "velocity"]
     change: Annotated[Floats, "row"]  # J Δv of a Newton step
     v: Annotated[Floats, "velocity"]  # local velocities
     free: Annotated[Floats, "velocity"]  # v*

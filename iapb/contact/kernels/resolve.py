@@ -57,9 +57,8 @@ class Results(NamedTuple):
     generalized_impulse: np.ndarray  # (n, d)
     impulses: np.ndarray  # (n, c)
     tangential: np.ndarray  # (n, c m)
-    numbers: (
-        np.ndarray
-    )  # (n, 7) rank, status, energy change, its lower and its upper bound, clamp, share of friction
+    # (n, 7) rank, status, energy change, its lower and its upper bound, clamp, share of friction
+    numbers: np.ndarray
 
 
 class ResolveWork(NamedTuple):
@@ -67,9 +66,8 @@ class ResolveWork(NamedTuple):
 
     coordinate_exponent: Annotated[Integers, "velocity"]  # s
     row_exponent: Annotated[Integers, "row"]  # r
-    size: Annotated[
-        Floats, "row"
-    ]  # ratio of the caller's rows to the scaled rows, up to one common factor
+    # ratio of the caller's rows to the scaled rows, up to one common factor
+    size: Annotated[Floats, "row"]
     length: Annotated[Floats, "row"]
     impact: ImpactWork  # scaled
     push: PushWork

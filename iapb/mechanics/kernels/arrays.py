@@ -55,9 +55,8 @@ class Workspace(NamedTuple):
     linear_acceleration: Annotated[Floats, "body 3"]  # of the body origin, minus gravity
     force: Annotated[Floats, "body 3"]  # that the joint transmits to the body
     moment: Annotated[Floats, "body 3"]  # about the body origin
-    placed_q: Annotated[
-        Floats, "placed"
-    ]  # first nq: the q of the first four fields; NaN: not computed yet
+    # first nq: the q of the first four fields; NaN: not computed yet
+    placed_q: Annotated[Floats, "placed"]
 
 
 def make_workspace(bodies: int, dofs: int) -> Workspace:

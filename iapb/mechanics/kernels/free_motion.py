@@ -59,9 +59,8 @@ class FreeMotion(NamedTuple):
     kind: np.ndarray  # (t,) int64 STRAIGHT, RIGID or LINKAGE
     root: np.ndarray  # (t,) int64 first body that moves, −1 = none
     base: np.ndarray  # (t,) int64 number of root velocities with a conserved momentum
-    center: (
-        np.ndarray
-    )  # (t, 3) centre of mass of a RIGID tree [m]; zero if it turns about its origin
+    # (t, 3) centre of mass of a RIGID tree [m]; zero if it turns about its origin
+    center: np.ndarray
     axes: np.ndarray  # (t, 3, 3) its principal axes as rows, both in the root's axes
     moments: np.ndarray  # (t, 3) its principal moments [kg m²] about centre or origin, ascending
     turning: bool  # whether any tree is RIGID or a LINKAGE

@@ -16,9 +16,8 @@ from iapb.system import System
 
 ARM, PEG = (load_scene(find_scene(name)) for name in ("arm_pushing", "peg_hole_space"))
 _BODIES = ARM.resolved()["bodies"]
-BEHIND = ARM.with_values(
-    {"bodies": [_BODIES[2], *_BODIES[:2]]}
-)  # the arm in the hand is the second tree
+# the arm in the hand is the second tree
+BEHIND = ARM.with_values({"bodies": [_BODIES[2], *_BODIES[:2]]})
 
 
 def started(scene: Scene, kind: Any = FourChannel) -> Any:

@@ -46,9 +46,8 @@ def test_q_and_v_are_the_positions_and_velocities_in_the_order_of_the_bodies() -
     assert mechanism.names == tuple(body.name for body in scene.bodies)
     assert q.shape == (mechanism.nq,) and q[mechanism.coordinate_names.index("two.angle")] == 0.5
     assert v.shape == (mechanism.nv,) and v[-3:].tolist() == [1, 2, 3]
-    np.testing.assert_array_equal(
-        mechanism.mass_matrix(q)[-3:, -3:], np.diag([2.0, 2.0, 3.0])
-    )  # of the free puck
+    # of the free puck
+    np.testing.assert_array_equal(mechanism.mass_matrix(q)[-3:, -3:], np.diag([2.0, 2.0, 3.0]))
 
 
 def test_prismatic_axis_lies_in_the_plane_and_has_length_one() -> None:
@@ -67,9 +66,8 @@ def test_shapes_of_a_body_that_nothing_moves_are_static_and_in_world_axes() -> N
     shapes = shapes_of(CHAIN)
     assert list(shapes.body) == [-1, 1, 2, 3, 4, 5, -1]
     assert list(shapes.kind) == [CIRCLE] * 4 + [POLYGON, CIRCLE, HALF_PLANE]
-    np.testing.assert_allclose(
-        shapes.vertices[shapes.first[BRACKET]], [1.0, 5.0], atol=1e-15
-    )  # turned by 90°
+    # turned by 90°
+    np.testing.assert_allclose(shapes.vertices[shapes.first[BRACKET]], [1.0, 5.0], atol=1e-15)
     np.testing.assert_array_equal(shapes.vertices[shapes.first[FLOOR] + 1], [0.0, 1.0])
 
 

@@ -50,9 +50,8 @@ def test_restitution_scales_the_distance_and_moves_no_border() -> None:
 
 
 def test_a_touching_contact_that_is_left_approaching_is_told() -> None:
-    rows = np.array(
-        [[1.0, 0.5], [1.0, -0.5]]
-    )  # the ends of a bar, of which the second only touches
+    # the ends of a bar, of which the second only touches
+    rows = np.array([[1.0, 0.5], [1.0, -0.5]])
     bar = ImpactCase(
         np.diag([1.0, 1.0 / 12.0]), rows[:1], np.array([-1.0, -2.0]), 0.5, touching=rows[1:]
     )

@@ -18,9 +18,8 @@ from tests.verification.laws.faults import moreau, newton, poisson
 from verification import check_passivity
 from verification.laws import sound_resolver
 
-SEEDS, IMPACTS = (
-    (100, 5000) if os.environ.get("IAPB_HYPOTHESIS_PROFILE") == "deep" else (1, 100)
-)  # hours, or seconds
+# hours, or seconds
+SEEDS, IMPACTS = (100, 5000) if os.environ.get("IAPB_HYPOTHESIS_PROFILE") == "deep" else (1, 100)
 
 
 def whole_numbers(M: Any, J: Any, v: Any, e: Any) -> Any:

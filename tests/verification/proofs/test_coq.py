@@ -62,10 +62,8 @@ def test_the_extracted_checker_judges_as_the_exact_judge_does(
         impacts = near_the_border(IMPACTS // 4, d, rng, decades)
         lines += exported(*impacts)
         gained += judge_gains(*impacts).gained.tolist()
-    lines += [
-        f"1 1 0 {2**62 - 1} 0 {1 - 2**62} 0",
-        f"end {len(gained) + 1}",
-    ]  # the largest number that OCaml holds
+    # the largest number that OCaml holds
+    lines += [f"1 1 0 {2**62 - 1} 0 {1 - 2**62} 0", f"end {len(gained) + 1}"]
     gained.append(False)
     (tmp_path / "impacts.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
     done = subprocess.run([checker, tmp_path / "impacts.txt"], capture_output=True, text=True)

@@ -66,9 +66,8 @@ def test_a_corrupted_statement_is_refused_by_each_kernel(
     assert by_sympy.refusal(block, certificates(name)[:number]), (
         "SymPy accepts the certificate of the true statement"
     )
-    monkeypatch.setattr(
-        Expression, "vanishes", lambda self: True
-    )  # the kernel's own expansion is switched off
+    # the kernel's own expansion is switched off
+    monkeypatch.setattr(Expression, "vanishes", lambda self: True)
     assert checked(block).sympy == "no"
 
 

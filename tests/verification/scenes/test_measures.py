@@ -109,9 +109,8 @@ def test_impacts_separate_in_their_own_step_only():
 
 
 def test_the_overlap_of_the_device_is_that_of_its_deepest_corner():
-    away, inside = (
-        np.tile([x, -0.05, 0.0], (STEPS + 1, 1)) for x in (0.05, 0.0100)
-    )  # 0.5 mm in the right wall
+    # 0.5 mm in the right wall
+    away, inside = (np.tile([x, -0.05, 0.0], (STEPS + 1, 1)) for x in (0.05, 0.0100))
     assert measures.device_overlap(trace(device=inside, tool=away)) == pytest.approx(5e-4)
     assert measures.device_overlap(trace(device=away)) == 0.0
 
