@@ -131,8 +131,6 @@ def test_where_times_decide_the_rows_they_are_known_by_what_was_asked():
     assert (
         found.count(TIMING) == 10
     )  # the times of those two, and two rows of four cells of one alone
-    with pytest.raises(ValueError, match="timed columns"):
-        titled(("a",), ((1.0,),), timed=("b",))
 
 
 def test_what_keeps_runs_from_repeating_is_named():
