@@ -184,6 +184,11 @@ class Finding:
     failures: tuple[Failure, ...] = ()
     timed: bool = False
 
+    def __str__(self) -> str:
+        """Return the result, then a line for each part."""
+        parts = (f"  {IN_WORDS[part.verdict]}: {part.sentence}" for part in self.parts)
+        return "\n".join((f"{self.key}, {self.title}: {self.outcome}", self.answer, *parts))
+
     @property
     def outcome(self) -> str:
         """What a claim comes to, in words; it follows from the parts that are the statement of the

@@ -124,7 +124,8 @@ def compare_worlds(
         Its tables are "worlds" (one row per world) and "over time". If IAPB is one of the worlds,
         the answer begins with its impacts beside the LCP's. Then it names the closest of the worlds
         whose runs are complete and trustworthy, unless they differ by less than the reference's own
-        error (the difference from itself at half its step), and the others with the reason.
+        error (the difference from itself at half its step). The first part gives the reason of the
+        others.
 
     Raises
     ------

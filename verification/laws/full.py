@@ -130,6 +130,9 @@ def _judge_impacts(batch: Batch, resolver: Resolver, seed: int) -> Outcome:
         patience=np.inf,
         search=0,
     )
+    for one in report.verdicts:
+        if one.error is not None:  # of the law itself, which judged nothing since
+            raise one.error
     counts = tuple(LawCount(one.law) + one for one in report.verdicts)
     found = (Found(one.law, IMPACTS, batch.first, report.test_of(one)) for one in report.found)
     return Outcome(IMPACTS, counts, tuple(found))

@@ -235,12 +235,13 @@ class PassivityReport(Report):
         largest = max((one.largest for one in self.verdicts if not one.passed), default=0.0)
         if not 0.0 < largest < ITERATED:
             return ""
+        wider = 10.0 ** np.ceil(np.log10(largest))
         table = "KIT" if self.contract == "equality" else "ONE_SIDED"
         return (
-            f"No error is above {largest:.0e}, which an iteration that ends early can explain. "
+            f"No error is above {wider:.0e}, which an iteration that ends early can explain. "
             "Widen the tolerances: bounds=dataclasses.replace(verification.laws.bounds."
-            f"{table}, least={ITERATED}, restitution={ITERATED}). "
-            f"Errors below {ITERATED} of v are not noticed then"
+            f"{table}, least={wider:.0e}, restitution={wider:.0e}). "
+            f"Errors below {wider:.0e} of v are not noticed then"
         )
 
     def _text(self) -> str:

@@ -70,7 +70,7 @@ def test_errors_of_an_iteration_get_a_hint_and_others_none() -> None:
     def iterated(M: Any, J: Any, v: Any, e: Any) -> Any:
         return sound_resolver(M, J, v, e) * (1.0 + 1e-6)
 
-    assert "least=0.0001" in str(check_passivity(iterated, impacts=10, search=0))
+    assert "least=1e-05" in str(check_passivity(iterated, impacts=10, search=0))
     assert "hint" not in str(check_passivity(wrong_sign, impacts=10, search=0))
     assert "hint" not in str(check_passivity(sound_resolver, impacts=10, search=0))
 
