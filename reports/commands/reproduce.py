@@ -167,10 +167,8 @@ def _write_figure(key: str, out: Path, depth: str, changes: list[str]) -> Answer
 
 
 def _shows_scenes(recipe: Recipe) -> bool:
-    """Whether the figure is drawn from runs and scenes only, so that it needs no other evidence."""
-    return bool(recipe.needs) and all(
-        name in (*FIGURE_RUNS, TILTED, CORNER_SCENE) for name in recipe.needs
-    )
+    """Whether the figure is drawn from runs, whose scenes may be changed."""
+    return any(name in (*FIGURE_RUNS, TILTED) for name in recipe.needs)
 
 
 def _inputs(
@@ -179,10 +177,11 @@ def _inputs(
     """Return the inputs of a figure and the failed cases. If runs and scenes do not suffice,
     compute all evidence."""
     needs = recipe.needs
+    at_hand = all(name in (*FIGURE_RUNS, TILTED, CORNER_SCENE) for name in needs)
     if values and not _shows_scenes(recipe):
         able = ", ".join(each.key for each in RECIPES if _shows_scenes(each))
         raise ArgumentError("--set", recipe.key, f"a figure that shows scenes: {able}")
-    if needs and not _shows_scenes(recipe):
+    if not at_hand:
         evidence = gather(out, depth, progress)
         return figure_inputs(evidence), evidence.failed
     runner = Runner(out / "runs")
@@ -193,6 +192,6 @@ def _inputs(
         elif name == TILTED:
             found[name] = tilted_runs(runner, values)
         else:
-            found[name] = corner_scene(values)
+            found[name] = corner_scene()
         progress("runs of the figure", done, len(needs))
     return found, ()

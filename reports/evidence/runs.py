@@ -79,6 +79,6 @@ def tilted_runs(
         }
 
 
-def corner_scene(changed: dict[str, Any] | None = None) -> dict[str, Any]:
+def corner_scene() -> dict[str, Any]:
     """Return the resolved scene of the peg in the corner."""
-    return shipped_scene("peg_corner", changed).resolved()
+    return shipped_scene("peg_corner").resolved()

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from reports.figures.figure import Figure, Panel
+from reports.figures.numbers import format_cell
 from reports.figures.plot import Plot
 from reports.figures.style import OUTCOMES
 from verification.impacts import Floats
@@ -51,7 +52,10 @@ def condition_map(
     for value in dict.fromkeys(given.tolist()):
         here = given == value
         places = np.column_stack([axis.places[here] for axis in axes])
-        label = value if isinstance(value, str) else f"{_titled(table, split)[0]}: {value:.3g}"
+        label = value
+        if not isinstance(value, str):
+            shown, factor = _titled(table, split)
+            label = f"{shown}: {factor * value:.3g}"
         panels.append(_panel(f"{name}-{len(panels)}", label, axes, places, held[here]))
     return Figure(name, "", title, caption, tuple(panels), None, tuple(OUTCOMES.items()))
 
@@ -69,7 +73,7 @@ def _axis(table: Table, key: str) -> Axis:
     different, ranks = np.unique(values, return_inverse=True)
     if len(different) > _MOST:
         return Axis(title, values, [])
-    return Axis(title, ranks.astype(float), [f"{value:.3g}" for value in different])
+    return Axis(title, ranks.astype(float), [format_cell(float(value), 3) for value in different])
 
 
 def _panel(key: str, label: str, axes: tuple[Axis, Axis], trials: Floats, held: Floats) -> Panel:
