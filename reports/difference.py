@@ -130,7 +130,7 @@ def compare_reports(
 def _cells(table: str, old: Table, new: Table, tolerance: float) -> Iterator[Cell]:
     timed = {*old.timed, *new.timed}
     prose = {*old.prose, *new.prose}
-    timed_rows = old.timed_rows or new.timed_rows
+    timed_rows = old.kinds.timed_rows or new.kinds.timed_rows
     names = [_names(one, timed_rows) for one in (old, new)]
     if len(old.rows) == len(new.rows) and not timed_rows:
         names = [[f"{number}: {name}" for number, name in enumerate(names[0], 1)]] * 2

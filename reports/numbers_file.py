@@ -16,7 +16,7 @@ from reports.pages.records import Evidence
 from reports.store.io import write_whole
 from reports.store.keys import plain
 from verification.numbers import value_tables
-from verification.table import Table, titled
+from verification.table import Columns, Table, titled
 
 NUMBERS_NAME = "numbers.json"
 FORMAT = "iapb numbers"
@@ -114,13 +114,14 @@ def _by_time(
     by a first cell."""
     rows: dict[bool, list[Any]] = {False: [], True: []}
     for timed, *row in found:
-        rows[timed].append(tuple(row))
+        rows[timed].append(row)
     yield (
         name,
-        titled(titles, rows[False], prose=tuple(title for title in titles if title == "sentence")),
+        titled(titles, rows[False], kinds=Columns(prose=("sentence",))),
     )
     if rows[True]:
-        yield f"{name}, from times", titled(titles, rows[True], timed=titles[1:], timed_rows=True)
+        kinds = Columns(timed=titles[1:], timed_rows=True)
+        yield f"{name}, from times", titled(titles, rows[True], kinds=kinds)
 
 
 def write_numbers(path: Path, numbers: ReportNumbers) -> Path:
@@ -130,7 +131,7 @@ def write_numbers(path: Path, numbers: ReportNumbers) -> Path:
         name: {
             "columns": list(table.titles),
             "timed": list(table.timed),
-            "timed_rows": table.timed_rows,
+            "timed_rows": table.kinds.timed_rows,
             "prose": list(table.prose),
             "rows": [[_cell(value) for value in row] for row in table.cells],
         }
@@ -208,4 +209,5 @@ def _table(table: Any) -> Table:
     )
     if any(len(row) != len(columns) for row in rows):
         raise ValueError("a row without a cell for each column")
-    return titled(columns, rows, timed=timed, timed_rows=bool(table["timed_rows"]), prose=prose)
+    kinds = Columns(timed=timed, prose=prose, timed_rows=bool(table["timed_rows"]))
+    return titled(columns, rows, kinds=kinds)

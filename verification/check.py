@@ -11,12 +11,14 @@ outcomes of the rows.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from types import MappingProxyType
 from typing import Any, TypeVar, cast
 
+from iapb.errors import ArgumentError
+from iapb.names import one_of
 from iapb.run import Run
 from iapb.scene import Scene, find_scene, load_scene
 from reference.worlds import run_world
@@ -31,7 +33,6 @@ from verification.finding import (
     Finding,
     Part,
     attempt,
-    check_depth,
     counts_of,
     finding_of,
     judge_part,
@@ -41,11 +42,12 @@ from verification.finding import (
 from verification.numbers import Values, value_tables
 from verification.proofs import check as check_proof
 from verification.region import Region
-from verification.table import HOLDS, Row, Table, by_part, table_from
+from verification.table import HOLDS, Columns, Row, Table, by_part, table_from
 
 Case = TypeVar("Case")
 Result = TypeVar("Result")
 
+DEPTHS = ("quick", "full")
 SEED = 20050601  # of random impacts and conditions: the month in which the paper appeared
 
 
@@ -76,7 +78,8 @@ class Study:
     results: dict[Hashable, Any] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
-        check_depth(self.depth)
+        if self.depth not in DEPTHS:
+            raise ArgumentError("depth", self.depth, one_of(self.depth, DEPTHS))
         self.simulate = self.simulate or self.run
 
     def once(self, key: Hashable, compute: Callable[[], Result]) -> Result:
@@ -121,15 +124,12 @@ class Check:
         whose keys here lack the unit. Without it a row may have the key "holds"; without either,
         nothing is judged
     targets : table -> a `Part.on` for each number of a topic that has a target; each decides alone
-    conditions, parts, counts, timed, prose : keys of the columns that are conditions, that split
-        the rows into parts, that count the cases of a row, that depend on measured times, and that
-        are sentences (see `Column`)
-    roles : for a part, or a value of a column of `parts`: MISPRINT or BEYOND if it is not the
+    columns : which columns are conditions, which split the rows into parts, which are times ...
+    roles : for a part, or a value of a column of parts: MISPRINT or BEYOND if it is not the
         statement of the question; or the statement of `verification.proofs` that proves it, if the
         code forbids a failure
     draw : (study, region) -> fresh cases inside a region, which confirm it; None if there are no
         fresh cases
-    timed_rows : True if the selection of rows depends on measured times
     """
 
     key: str
@@ -138,14 +138,9 @@ class Check:
     row: Callable[[Study, Any], Row | Iterable[Row]]
     holds: Callable[[Row], bool | None] | None = None
     targets: Callable[[Table], Iterable[Part]] | None = None
-    conditions: Collection[str] = ()
-    parts: Collection[str] = ()
-    counts: Collection[str] = ()
-    timed: Collection[str] = ()
-    prose: Collection[str] = ()
+    columns: Columns = Columns()
     roles: Mapping[str, str] = field(default_factory=dict, hash=False)
     draw: Callable[[Study, Region], Iterable[Any]] | None = None
-    timed_rows: bool = False
 
     def table(self, study: Study, cases: Iterable[Any] | None = None) -> Table:
         """Return the judged rows of the given cases; by default of all cases."""
@@ -161,15 +156,7 @@ class Check:
     def table_of(self, rows: Iterable[Row]) -> Table:
         """Return the judged table of these rows; a row without a value has None in its place."""
         given = list(rows)
-        table = table_from(
-            given,
-            timed_rows=self.timed_rows,
-            condition=self.conditions,
-            part=self.parts,
-            cases=self.counts,
-            timed=self.timed,
-            prose=self.prose,
-        )
+        table = table_from(given, kinds=self.columns)
         if self.holds is not None:
             return table.judged(self.holds)
         known = any(HOLDS in row for row in given)
@@ -232,9 +219,8 @@ class Check:
         if not table.holds:
             return ()
         held, decided, unknown = counts_of(table)
-        timed = any(column.timed for column in table.columns)
         verdict = verdict_of_law(table.holds)
-        return (Part("", verdict, self.question, held, decided, unknown, timed=timed),)
+        return (Part("", verdict, self.question, held, decided, unknown, timed=bool(table.timed)),)
 
 
 def no_row_fails(name: str) -> Callable[[Table], tuple[Part, ...]]:

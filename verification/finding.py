@@ -12,8 +12,6 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
-from iapb.errors import ArgumentError
-from iapb.names import one_of
 from verification.region import Region, confirmed
 from verification.table import Table, titled
 
@@ -75,7 +73,6 @@ KINDS = (
 LEAST_DECIDED = 10
 # A finding is reproduced only if every part is decided.
 WORST_FIRST = (REFUTED, MIXED, NOT_COMPUTED, NOT_TESTABLE, WHERE, REPRODUCED)
-DEPTHS = ("quick", "full")
 FAILED_CASES = "not computed"  # name of the table of cases that failed
 
 
@@ -227,12 +224,6 @@ def _listed(before: str, names: Iterable[str]) -> str:
     )
 
 
-def check_depth(depth: str) -> None:
-    """Raise ArgumentError unless the depth is one of DEPTHS."""
-    if depth not in DEPTHS:
-        raise ArgumentError("depth", depth, one_of(depth, DEPTHS))
-
-
 def worst(verdicts: Iterable[str]) -> str:
     """Return the worst verdict; NOT_COMPUTED if there is none."""
     return min(verdicts, key=WORST_FIRST.index, default=NOT_COMPUTED)
@@ -269,7 +260,7 @@ def counts_of(trials: Table) -> tuple[int, int, int]:
 
     A row is one trial, or as many as its column of cases says, of which FAILING many fail.
     """
-    keys = [column.key for column in trials.columns if column.cases]
+    keys = [column.key for column in trials.of_kind(trials.kinds.counts)]
     held = decided = unknown = 0
     for row, outcome in zip(trials.records(), trials.holds, strict=True):
         count = row[keys[0]] if keys and row[keys[0]] is not None else 1
@@ -293,9 +284,8 @@ def judge_part(name: str, trials: Table, fresh: Callable[[Region], Table] | None
     `fresh` draws inside. At least LEAST_CONFIRMING trials must confirm the region: fresh trials if
     they can be drawn, else those of the other half.
     """
-    timed = any(column.timed for column in trials.columns)
     held, decided, unknown = counts_of(trials)
-    part = Part("", NOT_TESTABLE, name, held, decided, unknown, timed=timed)
+    part = Part("", NOT_TESTABLE, name, held, decided, unknown, timed=bool(trials.timed))
     if decided < LEAST_DECIDED:
         return replace(part, role=FEW if decided else "")
     part = replace(part, verdict=verdict_of_share(held / decided))

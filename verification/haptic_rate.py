@@ -20,7 +20,7 @@ from verification.cost.calls import PRINTED
 from verification.cost.trajectories import MOTIONS, OURS, WORTH, aims
 from verification.finding import NOT_COMPUTED, REPRODUCED, Finding, Part
 from verification.numbers import Values
-from verification.table import Row, Table
+from verification.table import Columns, Row, Table
 
 STEP = "One step at rest"
 IMPACT = "One impact"
@@ -190,8 +190,7 @@ EACH = Check(
     cases=lambda study: list(ratios(study)),
     row=lambda _, row: row,
     targets=no_targets,
-    timed=TIMED,
-    timed_rows=True,
+    columns=Columns(timed=TIMED, timed_rows=True),
 )
 RATIOS = Check(
     key="ratios",
@@ -199,8 +198,7 @@ RATIOS = Check(
     cases=lambda study: summaries(study.table(EACH).by_title()),
     row=lambda _, row: row,
     targets=ratio_targets,
-    timed=TIMED,
-    timed_rows=True,
+    columns=Columns(timed=TIMED, timed_rows=True),
 )
 BENCH = Topic(
     key="haptic-rate",

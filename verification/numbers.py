@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from verification.table import Table, titled
+from verification.table import Columns, Table, titled
 
 # names of the two tables
 NUMBERS = "numbers"
@@ -21,7 +21,7 @@ def value_tables(values: Values, timed: Values | None = None) -> dict[str, Table
     """Return the tables of numbers by name; `timed` are those that depend on measured times."""
     tables = {NUMBERS: titled(("key", "value"), values.items())}
     if timed:
-        tables[TIMES] = titled(("key", "value"), timed.items(), timed=("value",))
+        tables[TIMES] = titled(("key", "value"), timed.items(), kinds=Columns(timed=("value",)))
     return tables
 
 

@@ -134,8 +134,8 @@ def search_region(trials: Table) -> Region | None:
     """
     scales = [
         scale
-        for column in trials.columns
-        if column.condition and (scale := _intervals(column, trials))
+        for column in trials.of_kind(trials.kinds.conditions)
+        if (scale := _intervals(column, trials))
     ]
     everything = [_Interval("", "", None, None, 1.0, np.ones(len(trials.rows), np.bool_))]
     alone, together = (
@@ -195,7 +195,7 @@ def _best(
 def _intervals(column: Column, trials: Table) -> list[_Interval]:
     """All values of a condition and all intervals between two of them, including the unbounded one;
     empty if a value is no number, or if there is only one value."""
-    values = trials.column(column.key)
+    values = trials[column.key]
     if not all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
         return []
     seen = sorted(set(values))

@@ -16,27 +16,34 @@ _UNIT = re.compile(r"^(?P<key>.*\S) \[(?P<unit>[^\[\]]+)\]$")
 
 
 @dataclass(frozen=True)
-class Column:
-    """One quantity of every row.
+class Columns:
+    """The columns of a table that are more than a measured value, by key or title.
 
     Attributes
     ----------
-    key : name of the column, in code and in print; unit : empty if there is none
-    condition : True if the study chooses the value, False if it measures it
-    part : True if the rows with the same value form one part, which is judged separately
-    cases : True if the value counts the cases of a row, such as the impacts of a batch whose worst
-        one is judged
-    timed : True for a measured time or a value computed from one; it may differ in the next run
-    prose : True for sentences; the numbers in them are compared through other tables
+    conditions : their values are chosen by the study, not measured
+    parts : the rows with the same values in them form one part, which is judged separately
+    counts : numbers of the cases of a row, such as the impacts of a batch whose worst one is judged
+    timed : measured times and values computed from them; they may differ in the next run
+    prose : sentences; the numbers in them are compared through other tables
+    timed_rows : True if the selection of rows depends on measured times
     """
+
+    conditions: tuple[str, ...] = ()
+    parts: tuple[str, ...] = ()
+    counts: tuple[str, ...] = ()
+    timed: tuple[str, ...] = ()
+    prose: tuple[str, ...] = ()
+    timed_rows: bool = False
+
+
+@dataclass(frozen=True)
+class Column:
+    """One quantity of every row: its name in code and in print, and its unit; "" if there is
+    none."""
 
     key: str
     unit: str = ""
-    condition: bool = False
-    part: bool = False
-    cases: bool = False
-    timed: bool = False
-    prose: bool = False
 
     @property
     def title(self) -> str:
@@ -53,7 +60,7 @@ class Table:
     holds : whether the claim holds, one entry per row; None if the row cannot decide; empty if
         nothing is judged
     digits : significant digits in print; note : text printed below the table
-    timed_rows : True if the selection of rows depends on measured times
+    kinds : which columns are conditions, parts, times ...
     """
 
     columns: tuple[Column, ...]
@@ -61,14 +68,12 @@ class Table:
     holds: tuple[bool | None, ...] = ()
     digits: int = 3
     note: str = ""
-    timed_rows: bool = False
+    kinds: Columns = Columns()
 
-    def column(self, key: str) -> list[Any]:
+    def __getitem__(self, key: str) -> list[Any]:
         """Return the values of one column."""
         index = self.keys.index(key)
         return [row[index] for row in self.rows]
-
-    __getitem__ = column
 
     def records(self) -> list[dict[str, Any]]:
         """Return the rows as dictionaries by key."""
@@ -127,17 +132,21 @@ class Table:
             return self.rows
         return tuple((*row, WORDS[held]) for row, held in zip(self.rows, self.holds, strict=True))
 
+    def of_kind(self, names: Collection[str]) -> list[Column]:
+        """Return the columns that are named, by key or title."""
+        return [one for one in self.columns if one.key in names or one.title in names]
+
     @property
     def timed(self) -> tuple[str, ...]:
         """Titles of the timed columns; the outcomes are included, since they may depend on any
         measured value."""
-        found = tuple(column.title for column in self.columns if column.timed)
+        found = tuple(column.title for column in self.of_kind(self.kinds.timed))
         return (*found, HOLDS) if found and self.holds else found
 
     @property
     def prose(self) -> tuple[str, ...]:
         """Titles of the columns of sentences."""
-        return tuple(column.title for column in self.columns if column.prose)
+        return tuple(column.title for column in self.of_kind(self.kinds.prose))
 
 
 def titled(
@@ -145,13 +154,12 @@ def titled(
     rows: Iterable[Sequence[Any]] = (),
     digits: int = 3,
     note: str = "",
-    timed_rows: bool = False,
-    **marks: Collection[str],
+    kinds: Columns = Columns(),
 ) -> Table:
     """Return a table from titles such as "step [ms]": the brackets hold the unit; the rest is the
-    key. `marks` are those of `column_of`."""
-    columns = tuple(column_of(title, **marks) for title in titles)
-    return Table(columns, tuple(tuple(row) for row in rows), (), digits, note, timed_rows)
+    key."""
+    columns = tuple(column_of(title) for title in titles)
+    return Table(columns, tuple(tuple(row) for row in rows), (), digits, note, kinds)
 
 
 def table_from(rows: Iterable[Row], **more: Any) -> Table:
@@ -165,19 +173,16 @@ def table_from(rows: Iterable[Row], **more: Any) -> Table:
     return titled(tuple(titles), ([row.get(title) for title in titles] for row in given), **more)
 
 
-def column_of(title: str, **marks: Collection[str]) -> Column:
-    """Return the column of a title such as "step [ms]". Each mark (`condition`, `part`, `timed`
-    ...) lists the titles or keys of the columns that have it."""
+def column_of(title: str) -> Column:
+    """Return the column of a title such as "step [ms]"."""
     match = _UNIT.match(title)
-    key, unit = (match["key"], match["unit"]) if match else (title, "")
-    flags: dict[str, Any] = {mark: title in names or key in names for mark, names in marks.items()}
-    return Column(key, unit, **flags)
+    return Column(match["key"], match["unit"]) if match else Column(title)
 
 
 def by_part(table: Table) -> dict[str, Table]:
     """Return the rows of each part by the part's name; a table without parts has one part named
     ""."""
-    marked = [column.key for column in table.columns if column.part]
+    marked = [column.key for column in table.of_kind(table.kinds.parts)]
     names = [", ".join(row[key] for key in marked) for row in table.records()]
     return {part: table.only(name == part for name in names) for part in dict.fromkeys(names)} or {
         "": table

@@ -59,7 +59,7 @@ from verification.finding import (
     finding_of,
 )
 from verification.scenes.books import risen
-from verification.table import Row, table_from
+from verification.table import Columns, Row, table_from
 
 Progress = Callable[[str, int, int], None]
 Ran = tuple[Run, float]  # a run, and the processor time per step [s] without set-up
@@ -174,7 +174,7 @@ def compare_worlds(
             f"Impulse: {impulse}. Lost: start and work done, minus the end. The time is the "
             f"processor's, without "
             "set-up.",
-            timed=("time per step", "times the fastest"),
+            kinds=Columns(timed=("time per step", "times the fastest")),
         ),
         "over time": table_from(
             row for name, found in series.items() for row in _rows_of(name, found)

@@ -1,6 +1,6 @@
 """A claim: a plastic impact, resolved a second time, changes nothing more.
 
-In the project it is a file of verification/claims, named in `_FILES` there. `conditions` are the
+In the project it is a file of verification/claims, named in `_FILES` there. The conditions are the
 columns in which a region is searched where the claim holds in part.
 
 Prints:
@@ -15,6 +15,7 @@ from iapb import resolve_impact
 from verification.check import Check, Study
 from verification.claims import CLAIMS, check_claims
 from verification.impacts import Family, draw_of_rank
+from verification.table import Columns
 
 
 def contacts(study: Study) -> tuple[int, ...]:
@@ -36,7 +37,7 @@ def resolved_twice(study: Study, contacts: int) -> dict[str, Any]:
         "contacts": contacts,
         "impacts": len(changes),
         "change": max(changes),
-        "bound": float(rounding),
+        "bound": rounding,
     }
 
 
@@ -51,8 +52,7 @@ U01 = Check(
     cases=contacts,
     row=resolved_twice,
     holds=stays,
-    conditions=["contacts"],
-    counts=["impacts"],
+    columns=Columns(conditions=("contacts",), counts=("impacts",)),
 )
 CLAIMS["U01"] = U01
 

@@ -98,7 +98,7 @@ RUNS = Check(
 
 
 def _sum(table: Table, key: str) -> int:
-    return sum(table.column(key)) if table.rows else 0
+    return sum(table[key]) if table.rows else 0
 
 
 def numbers(tables: Mapping[str, Table]) -> Values:

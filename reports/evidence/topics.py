@@ -70,7 +70,7 @@ CLAIM_STAGES = ("claims", "claims on the peg", "claims on times")
 def stage_of(claim: str) -> str:
     """Return the stage that checks a claim; those on the peg share runs, and take as long as all
     others together."""
-    if claims.CLAIMS[claim].timed:
+    if claims.CLAIMS[claim].columns.timed:
         return "claims on times"
     return "claims on the peg" if hasattr(peg, claim) else "claims"
 
@@ -110,9 +110,9 @@ def _plans_of(name: str) -> dict[str, Plan]:
     """
     topic = _topic(name)
     checks = getattr(topic, "checks", ())
-    timed = any(check.timed for check in checks)
-    ahead = [check for check in checks if not check.timed and check.key != CERTIFIED_RUNS]
-    if not (timed or len(ahead) < len(checks)):
+    timed = any(check.columns.timed for check in checks)
+    ahead = [check for check in checks if not check.columns.timed and check.key != CERTIFIED_RUNS]
+    if len(ahead) == len(checks):
         return {
             name: Plan(
                 Finding, lambda runner, depth, progress, failures: topic(runner, depth, progress)

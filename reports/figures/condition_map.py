@@ -47,7 +47,7 @@ def condition_map(
     """Draw the outcomes over the columns x and y, in one panel for every value of `split`."""
     axes = (_axis(table, x), _axis(table, y))
     held = np.array([np.nan if one is None else float(one) for one in table.holds])
-    given = np.array(table.column(split))
+    given = np.array(table[split])
     panels: list[Panel] = []
     for value in dict.fromkeys(given.tolist()):
         here = given == value
@@ -69,7 +69,7 @@ def _titled(table: Table, key: str) -> tuple[str, float]:
 
 def _axis(table: Table, key: str) -> Axis:
     title, factor = _titled(table, key)
-    values = factor * np.array(table.column(key))
+    values = factor * np.array(table[key])
     different, ranks = np.unique(values, return_inverse=True)
     if len(different) > _MOST:
         return Axis(title, values, [])

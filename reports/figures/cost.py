@@ -23,12 +23,12 @@ _ERRORS = (1e-5, 10.0)  # [lengths of the body]
 @recipe("motions", "haptic-rate/motions")
 def motions(table: Table) -> Drawn:
     """Draw a panel for each scene, all with the same axes, and a curve for each world."""
-    tried = table.column("method")
+    tried = table["method"]
     names = {world: name for world, name in _NAMES.items() if world in tried}
     spent = [run["time"] for run in motion.runs_of(table)]
     ends = min(spent) / 2.0, max(*spent, _REAL_TIME) * 2.0
     panels = []
-    for number, scene in enumerate(dict.fromkeys(table.column("scene"))):
+    for number, scene in enumerate(dict.fromkeys(table["scene"])):
         with Plot(f"motions-{number}") as plot:
             plot.axes.axvline(_REAL_TIME, color=MUTED, linewidth=1.0, linestyle=(0, (1.4, 1.4)))
             for world, name in names.items():

@@ -59,7 +59,7 @@ def law_svg(report: ForceReport) -> str:
 @recipe("port-map", "stability/edges")
 def port_map(table: Table) -> Drawn:
     """Draw the edge of each coupling of the paper."""
-    looks = looks_of(table.column("law"))
+    looks = looks_of(table["law"])
     edges = {
         name: np.array(table.where(law=name).select(("damping", "friction")).rows) for name in looks
     }

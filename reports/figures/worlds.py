@@ -26,7 +26,7 @@ _PANELS = {
 
 def worlds_svg(table: Table, series: Table, against: str) -> str:
     """Draw five curves over time for each world, and bars of the time of a step."""
-    looks = looks_of(str(name) for name in table.column("world"))
+    looks = looks_of(str(name) for name in table["world"])
     with Plot("worlds", (9.6, 5.4), shape=(2, 3)) as plot:
         for axes, (key, (title, factor)) in zip(plot.each, _PANELS.items(), strict=False):
             _curves(axes, series, key, factor, looks, against)
@@ -40,7 +40,7 @@ def worlds_svg(table: Table, series: Table, against: str) -> str:
 
 
 def _bars(axes: Any, table: Table, looks: dict[str, LineStyle]) -> None:
-    spent = table.column("time per step")
+    spent = table["time per step"]
     colors = [look.color for look in looks.values()]
     drawn = axes.barh(list(looks), spent, color=colors, height=0.6)
     axes.bar_label(drawn, fmt="{:.3g}", padding=3)
@@ -56,9 +56,9 @@ def _curves(
     curves = {}
     for name in looks:
         mine = series.where(world=name)
-        values = mine.column(key)
+        values = mine[key]
         if None not in values and not (key in _DISTANCES and name == against):
-            curves[name] = mine.column("time"), [factor * value for value in values]
+            curves[name] = mine["time"], [factor * value for value in values]
     peaks = [max(values) for _, values in curves.values()]
     seen = [peak for peak in peaks if peak > _ROUNDING * max(peaks)]
     if key in _DISTANCES and seen and max(seen) > _LINEAR * min(seen):

@@ -35,7 +35,7 @@ from verification.laws import bulk
 from verification.laws.topic import CAUGHT, COUNTEREXAMPLES, LAW_TABLE
 from verification.scenes.books import OPEN
 from verification.scenes.ledger import SCENES
-from verification.table import Column, Table, table_from
+from verification.table import Column, Columns, Table, table_from
 
 ANY = (
     None,
@@ -58,15 +58,15 @@ FINDING = finding_of(
     {
         "judged": Table(
             (
-                Column("n", "N s", condition=True, part=True),
-                Column("time", "s", timed=True),
-                Column("said", prose=True),
+                Column("n", "N s"),
+                Column("time", "s"),
+                Column("said"),
             ),
             ((1, 0.5, "a"), (2, None, "b"), (3, math.inf, "c")),
             (True, None, False),
             3,
             "a note",
-            True,
+            Columns(("n",), timed=("time",), timed_rows=True),
         ),
         "empty": Table((Column("row"),)),
         "bare": Table(()),

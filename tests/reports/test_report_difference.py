@@ -19,7 +19,7 @@ from reports.difference import (
     unlike,
 )
 from reports.numbers_file import NUMBERS_NAME, ReportNumbers, read_numbers, write_numbers
-from verification.table import titled
+from verification.table import Columns, titled
 
 TABLE = titled(
     ("method", "gain", "median [µs]", "stable", "note"),
@@ -30,12 +30,12 @@ TABLE = titled(
         ("qr", None, 7.0, True, "x"),
         ("qr", 2.2e-16, 7.0, True, "x"),
     ),
-    timed=("median [µs]",),
+    kinds=Columns(timed=("median [µs]",)),
 )
 SENTENCES = titled(
     ("claim", "outcome", "sentence"),
     (("C07", "reproduced", "Gains 2.5e-3 at most."),),
-    prose=("sentence",),
+    kinds=Columns(prose=("sentence",)),
 )
 REPORT = ReportNumbers(
     {"claims/C07": TABLE, "claims": SENTENCES},
@@ -120,8 +120,7 @@ def test_where_times_decide_the_rows_they_are_known_by_what_was_asked():
         return titled(
             ("method", "contacts", "time [µs]", "stable"),
             rows,
-            timed=("time [µs]",),
-            timed_rows=True,
+            kinds=Columns(timed=("time [µs]",), timed_rows=True),
         )
 
     found = compare_reports(only(t=table(1, 60, 300)), only(t=table(1, 300, 600)))

@@ -112,7 +112,7 @@ def test_every_engine_run_used_before_is_certified(tmp_path):
     )  # left out: a rigid step solves impulses and forces together
     with runner.recording("a topic") as inside:
         table = energy.RUNS.table(Study(runner))
-    assert table.column("impacts") == [len(run.impacts.step)] and len(run.impacts.step) > 0
+    assert table["impacts"] == [len(run.impacts.step)] and len(run.impacts.step) > 0
     assert not inside and len(runner.files) == 3
 
 

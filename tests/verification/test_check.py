@@ -11,6 +11,7 @@ from verification.finding import (
     REPRODUCED,
     Part,
 )
+from verification.table import Column, Columns
 
 
 def row(study, case):
@@ -85,11 +86,9 @@ def test_a_table_made_before_is_not_made_again():
 
 
 def test_columns_follow_from_the_rows_and_have_their_marks():
-    table = a_check(conditions=["case"], timed=["size [m]"], holds=None).table_of(
-        [{"case": "a", "holds": True}, {"size [m]": 2.0, "case": "b"}]
-    )
-    case, size = table.columns
-    assert (case.condition, case.timed, size.unit, size.timed) == (True, False, "m", True)
+    check = a_check(columns=Columns(timed=("size [m]",)), holds=None)
+    table = check.table_of([{"case": "a", "holds": True}, {"size [m]": 2.0, "case": "b"}])
+    assert table.columns == (Column("case"), Column("size", "m"))
     assert table.timed == ("size [m]", "holds")
 
 

@@ -32,7 +32,7 @@ from verification.impacts import (
 )
 from verification.methods import gram_cholesky, gram_pinv
 from verification.proofs.cases import pseudo_inverse
-from verification.table import Row
+from verification.table import Columns, Row
 
 
 class Batch(NamedTuple):
@@ -106,9 +106,11 @@ def batches(
         cases=lambda study: cases,
         row=row,
         holds=holds or within_bound,
-        parts=["part"],
-        counts=["impacts"],
-        conditions=["coordinates", "contacts", "condition number", "restitution"],
+        columns=Columns(
+            parts=("part",),
+            counts=("impacts",),
+            conditions=("coordinates", "contacts", "condition number", "restitution"),
+        ),
         **more,
     )
 
@@ -608,8 +610,6 @@ C09 = Check(
     ],
     row=_without_impulse,
     holds=_moves_nothing,
-    parts=["part"],
+    columns=Columns(parts=("part",), counts=("impacts",), conditions=(*START, "contacts")),
     roles={ALMOST: BEYOND, RESOLVER: "scaled_impulse", TRAJECTORY: "scaled_impulse"},
-    counts=["impacts"],
-    conditions=[*START, "contacts"],
 )

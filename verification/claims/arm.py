@@ -11,7 +11,7 @@ import numpy as np
 from iapb import resolve_impact
 from iapb.system import System
 from verification.check import Check, Study
-from verification.table import Row
+from verification.table import Columns, Row
 
 if TYPE_CHECKING:
     from iapb.mechanics.mechanism import Mechanism
@@ -84,6 +84,7 @@ C07 = Check(
     cases=lambda study: list(product((RODS, POINTS), ANGLES, PLACES)),
     row=_struck,
     holds=_holds,
-    parts=["reading"],
-    conditions=["place along the second link", "angle of the second link"],
+    columns=Columns(
+        parts=("reading",), conditions=("place along the second link", "angle of the second link")
+    ),
 )

@@ -193,7 +193,7 @@ def _leaks(table: Table) -> Values:
     undamped = table.where(**{"device damping": 0.0})
     return {
         "C20 undamped walls": len(undamped.rows),
-        "C20 undamped walls that leak": sum(undamped.column("hand draws energy")),
+        "C20 undamped walls that leak": sum(undamped["hand draws energy"]),
     }
 
 

@@ -44,7 +44,7 @@ from verification.scenes.measures import (
     trace_of,
     unbalanced_force,
 )
-from verification.table import Row
+from verification.table import Columns, Row
 
 # Number of fresh starts that confirm a region. If a tenth of its starts fail, a region is confirmed
 # once in 24 times. MANY are drawn where most starts cannot tell, FEW where a start takes long.
@@ -111,6 +111,8 @@ def peg_claim(
     key: str,
     question: str,
     *,
+    parts: tuple[str, ...],
+    conditions: tuple[str, ...] = tuple(UNITS),
     limited: bool = False,
     rigid: bool = False,
     further: Iterable[Condition] = (),
@@ -134,8 +136,8 @@ def peg_claim(
             for start in drawn(cases(study), region, study.seed, fresh)
         ]
 
-    common: dict[str, Any] = {"cases": cases, "draw": draw, "conditions": tuple(UNITS)}
-    return Check(key=key, question=question, **common | more)
+    columns = Columns(conditions=conditions, parts=parts)
+    return Check(key=key, question=question, cases=cases, columns=columns, draw=draw, **more)
 
 
 def closest(row: Row, resolved: Mapping[str, float] = RESOLVED) -> bool | None:

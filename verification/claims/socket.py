@@ -15,7 +15,7 @@ from iapb.scene import Scene, find_scene, load_scene
 from verification.check import Check, Study
 from verification.finding import BEYOND
 from verification.region import Region
-from verification.table import Row
+from verification.table import Columns, Row
 
 BOTH = "both filters"
 COHERENCE_ALONE = "coherence alone"
@@ -183,8 +183,10 @@ C18 = Check(
     cases=_cases,
     row=_row,
     draw=_draw,
-    parts=["part"],
+    columns=Columns(
+        parts=("part",),
+        conditions=(JUMP, "coherence distance", REACH, "cluster distance", "damping", "rate"),
+    ),
     holds=_holds,
     roles={COHERENCE_ALONE: BEYOND, CLUSTERING: BEYOND},
-    conditions=[JUMP, "coherence distance", REACH, "cluster distance", "damping", "rate"],
 )

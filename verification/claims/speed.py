@@ -12,6 +12,7 @@ from verification.check import Check, Study
 from verification.cost import growth, impact_times
 from verification.finding import BEYOND
 from verification.region import Region
+from verification.table import Columns
 
 # C19: the haptic rate with many contacts
 
@@ -48,10 +49,12 @@ C19 = Check(
         case.coordinates, case.method, case.contacts, failures=study.failures
     ),
     holds=lambda row: bool(row["late calls"] <= growth.ALLOWED),
-    parts=["method", "deadline"],
-    conditions=["coordinates", "contacts"],
-    timed=["late calls", "time"],
-    timed_rows=True,
+    columns=Columns(
+        parts=("method", "deadline"),
+        conditions=("coordinates", "contacts"),
+        timed=("late calls", "time"),
+        timed_rows=True,
+    ),
 )
 
 
@@ -64,8 +67,10 @@ C22 = Check(
     cases=lambda _: impact_times.CASES,
     row=impact_times.compare,
     holds=impact_times.costs_more,
-    parts=["impacts", "method", "called"],
-    conditions=["contacts"],
-    timed=(*impact_times.MEASURED, *impact_times.OF_STEPS),
-    timed_rows=True,
+    columns=Columns(
+        parts=("impacts", "method", "called"),
+        conditions=("contacts",),
+        timed=(*impact_times.MEASURED, *impact_times.OF_STEPS),
+        timed_rows=True,
+    ),
 )

@@ -28,7 +28,7 @@ from verification.stability.walls import (
     loops,
     touch_walls,
 )
-from verification.table import Row
+from verification.table import Columns, Row
 
 # C17: the energy lost on impact
 
@@ -79,10 +79,9 @@ C17 = Check(
         for damping in DAMPINGS
     ],
     row=_losses,
-    conditions=["tilt", "stiffness", "damping"],
+    columns=Columns(conditions=("tilt", "stiffness", "damping"), parts=("part",)),
     holds=lambda row: bool(row["error"] <= ROUNDING_OF_LOSS) if row["impacts"] else None,
     roles={"loss": "loss_without_stiffness"},
-    parts=["part"],
 )
 
 
@@ -130,7 +129,7 @@ C20 = Check(
     ],
     row=_needs,
     holds=lambda row: row["hand draws energy"] is not _within(row),
-    conditions=["rate", "stiffness", "device damping", "virtual damping"],
+    columns=Columns(conditions=("rate", "stiffness", "device damping", "virtual damping")),
 )
 
 
@@ -209,6 +208,7 @@ C21 = Check(
     row=_settling,
     holds=_settles,
     draw=_draw,
-    parts=["against", "test"],
-    conditions=["rate", "delay", "device damping", "stiffness"],
+    columns=Columns(
+        parts=("against", "test"), conditions=("rate", "delay", "device damping", "stiffness")
+    ),
 )

@@ -32,7 +32,7 @@ from verification.cost.problems import patch, pile
 from verification.finding import Failure, attempt
 from verification.hard_cases import HARD_CASES
 from verification.impacts import Floats
-from verification.table import Row
+from verification.table import Columns, Row
 
 VERDICTS = ("solved", "refused", "failed", "missing", "left out")
 OWN = "own problems"  # name of the collection that `own_problems` makes
@@ -148,7 +148,7 @@ def _collection(name: str, folder: Path) -> Check:
         row=lambda study, line: line,
         holds=lambda row: "solved" in row.values(),
         targets=no_row_fails("problems that no solver solves"),
-        timed=["spread of velocities"],
+        columns=Columns(timed=("spread of velocities",)),
     )
 
 
@@ -169,7 +169,9 @@ SOLVER_TABLE = Check(
     question="Which solvers solve our own problems, by residuals computed again?",
     cases=lambda study: on_problems(study, OWN, None).solvers,
     row=_solver,
-    prose=VERDICTS,  # a slow solver is left out; which one is slow differs between runs
+    columns=Columns(
+        prose=VERDICTS
+    ),  # a slow solver is left out; which one is slow differs between runs
 )
 
 

@@ -26,7 +26,7 @@ from verification.cost import calls
 from verification.cost.calls import PRINTED, Call
 from verification.finding import Failure, attempt, counted
 from verification.impacts import TIMED_HARDNESS, ImpactCase, timed_problem
-from verification.table import Row, Table, table_from
+from verification.table import Columns, Row, Table, table_from
 
 COMPILED = "compiled"
 PYTHON = "from Python"
@@ -212,8 +212,7 @@ ACCURACY = Check(
     question="How exact is an impact in the time that it takes?",
     cases=lambda _: _hard(SIZES),
     row=partial(_measured, ROUNDS),
-    timed=MEASURED,
-    timed_rows=True,
+    columns=Columns(timed=MEASURED, timed_rows=True),
 )
 
 
@@ -395,8 +394,8 @@ def recommended(measured: Table) -> Table:
                 f"largest error, {called}": best and best.largest,
             }
         rows.append(row)
-    timed = [key for key in rows[0] if called_in(key)] if rows else ()
-    return table_from(rows, digits=2, timed=timed)
+    timed = tuple(key for key in rows[0] if called_in(key)) if rows else ()
+    return table_from(rows, digits=2, kinds=Columns(timed=timed))
 
 
 def called_in(key: str) -> bool:

@@ -30,7 +30,7 @@ from reference.worlds import World, find_world
 from verification.clock import LEAST_ROUNDS, Times, take_turns
 from verification.cost.steps import RecordedLoop
 from verification.finding import Failure, attempt, counted
-from verification.table import Row, Table, table_from
+from verification.table import Columns, Row, Table, table_from
 
 ROUNDS = 9  # number of rounds; each loop runs once per round
 SLOW = 0.5  # [s] a scene whose run takes longer has the least number of rounds
@@ -132,8 +132,7 @@ def effects_of(scene: Scene, world: str = "IAPB", failures: list[Failure] | None
             }
             for effect in effects
         ),
-        digits=3,
-        prose=("reason", "left out"),
+        kinds=Columns(prose=("reason", "left out")),
     )
 
 
@@ -228,7 +227,7 @@ def _shares(ratio: Times) -> tuple[float, float, float]:
 def steps_table(rows: Iterable[Row]) -> Table:
     """Return the times of the steps, the largest saving first."""
     ordered = sorted(rows, key=lambda row: -float(row["saved [%]"]))
-    return table_from(ordered, digits=3, timed=TIMED, timed_rows=True)
+    return table_from(ordered, kinds=Columns(timed=TIMED, timed_rows=True))
 
 
 def numbers_of(times: Table) -> Row:

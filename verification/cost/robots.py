@@ -18,7 +18,7 @@ from reference.rigid_body import calls_from_urdf
 from verification.check import Check, Study
 from verification.clock import seconds, take_turns
 from verification.mechanics.against_pinocchio import SEED, robot_files, shipped_robots
-from verification.table import Row
+from verification.table import Columns, Row
 
 STATES = 200  # random states, one call each, in one round
 ROUNDS = {"quick": 25, "full": 200}
@@ -77,5 +77,5 @@ ROBOTS = Check(
     question="How long do M and B take, compared with Pinocchio?",
     cases=lambda _: FILES,
     row=time_robot,
-    timed=("ours", "Pinocchio", "ratio", "lower quartile", "upper quartile"),
+    columns=Columns(timed=("ours", "Pinocchio", "ratio", "lower quartile", "upper quartile")),
 )

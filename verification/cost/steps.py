@@ -27,7 +27,7 @@ from verification.clock import take_turns, timed
 from verification.cost.growth import power_law
 from verification.cost.resting import RESTING, RestingScene
 from verification.finding import Part
-from verification.table import Row, Table
+from verification.table import Columns, Row, Table
 
 IDEAL = "ideal (QP per step)"  # in tables of times
 
@@ -172,13 +172,15 @@ RACES = Check(
     question="How long is a step, compared with MuJoCo's?",
     row=race,
     cases=lambda _: RESTING if find_spec("mujoco") else (),
-    timed=(
-        "MuJoCo's step",
-        "ratio",
-        "lower quartile",
-        "upper quartile",
-        "iapb's drift",
-        "MuJoCo's drift",
+    columns=Columns(
+        timed=(
+            "MuJoCo's step",
+            "ratio",
+            "lower quartile",
+            "upper quartile",
+            "iapb's drift",
+            "MuJoCo's drift",
+        )
     ),
 )
 
@@ -275,5 +277,5 @@ BODIES = Check(
     cases=lambda _: COUNTS,
     row=step_of_bodies,
     targets=body_targets,
-    timed=("step",),
+    columns=Columns(timed=("step",)),
 )

@@ -39,7 +39,7 @@ from verification.check import Check, Study
 from verification.clock import timed
 from verification.cost.steps import IDEAL, RecordedLoop
 from verification.finding import attempt
-from verification.table import Row, Table
+from verification.table import Columns, Row, Table
 
 FOLDER = Path(__file__).with_name("scenes") / "motions"
 # scene -> size of its bodies [m], the scale of errors
@@ -153,7 +153,7 @@ def worth(motions: Table, method: str) -> Row:
     The cost is the median over the scenes on which it can be fitted. A world has the smallest error
     of a scene if no run of another world has a smaller one.
     """
-    scenes = dict.fromkeys(motions.column("scene"))
+    scenes = dict.fromkeys(motions["scene"])
     costs = list[float]()
     least = list[float]()
     first = 0
@@ -166,7 +166,7 @@ def worth(motions: Table, method: str) -> Row:
         cost = tenfold_cost(falling(mine))
         if cost is not None:
             costs.append(cost)
-    made = motions.where(method=method, outcome=OK).column("energy made")
+    made = motions.where(method=method, outcome=OK)["energy made"]
     return {
         "method": method,
         "called": "compiled" if method in COMPILED else "from Python",
@@ -188,7 +188,7 @@ def aims(motions: Table) -> Iterator[Row]:
 
     Our worlds are those of `OURS`. None: we never reach that error.
     """
-    for scene in dict.fromkeys(motions.column("scene")):
+    for scene in dict.fromkeys(motions["scene"]):
         runs = runs_of(motions, scene=scene)
         ours = [run for run in runs if run["method"] in OURS]
         others = [run for run in runs if run["method"] not in OURS]
@@ -359,21 +359,23 @@ MOTIONS = Check(
     question="What does the accuracy of a whole motion cost?",
     cases=lambda _: TRAJECTORY_SCENES,
     row=motions_of,
-    timed=("time", "outcome", "note"),
+    columns=Columns(timed=("time", "outcome", "note")),
 )
 WORTH = Check(
     key="worth",
     question="What does ten times the accuracy cost?",
     cases=lambda _: WORLDS,
     row=lambda study, world: worth(study.table(MOTIONS), world),
-    timed=(
-        "tenfold accuracy costs",
-        "least cost",
-        "largest cost",
-        "scenes fitted",
-        "least error, median",
-        "smallest error of all",
-        "energy made",
-        "failed or too slow",
+    columns=Columns(
+        timed=(
+            "tenfold accuracy costs",
+            "least cost",
+            "largest cost",
+            "scenes fitted",
+            "least error, median",
+            "smallest error of all",
+            "energy made",
+            "failed or too slow",
+        )
     ),
 )

@@ -17,7 +17,7 @@ from verification.hard_cases.judge import judge_hard_case, methods_for
 from verification.numbers import Values
 from verification.ordinary.judge import ORDINARY, OURS, THEIRS
 from verification.ordinary.touch import TOUCH
-from verification.table import Row, Table
+from verification.table import Columns, Row, Table
 
 ENGINE = ("factored", "IAPB")  # the engine's default impact method and its world
 IMPACT = "impact"
@@ -75,7 +75,7 @@ EVERY_METHOD = Check(
     row=_judged,
     holds=is_right,
     targets=_targets,
-    prose=("note",),
+    columns=Columns(prose=("note",)),
 )
 
 
@@ -96,7 +96,7 @@ CASES = Check(
     question="Where does each case come from, why is it hard, and what is its answer?",
     cases=lambda study: HARD_CASES,
     row=_described,
-    prose=("why it is hard", "known answer", "expected"),
+    columns=Columns(prose=("why it is hard", "known answer", "expected")),
 )
 
 

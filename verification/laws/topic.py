@@ -17,7 +17,7 @@ from verification.laws.bounds import LawCount
 from verification.laws.scenes import SceneCase, draw_scene, draw_spatial_scene
 from verification.laws.trajectories import TRAJECTORY_LAWS, Trajectory
 from verification.methods import gram_pinv
-from verification.table import HOLDS, Row, Table
+from verification.table import HOLDS, Columns, Row, Table
 
 KIT_IMPACTS = 1500
 FAULT_IMPACTS = 400
@@ -125,7 +125,7 @@ LAW_TABLE = Check(  # the worst of random cases depends on rounding: it is print
     cases=_laws,
     row=lambda study, case: KINDS[case[0]](study, case[1]),
     targets=_law_targets,
-    prose=["worst"],
+    columns=Columns(prose=("worst",)),
 )
 
 
@@ -179,5 +179,5 @@ COUNTEREXAMPLES = Check(
     question="Which small inputs make other solvers gain energy?",
     cases=lambda study: MAKERS,
     row=lambda study, name: MAKERS[name](),
-    prose=("M", "J", "v⁻", "e", "v⁺", "test", "relative energy gain"),
+    columns=Columns(prose=("M", "J", "v⁻", "e", "v⁺", "test", "relative energy gain")),
 )

@@ -13,7 +13,7 @@ from iapb.scene import scene_names
 from verification.check import Check, Study
 from verification.finding import Part
 from verification.scenes.books import OPEN, energy_book, is_first_order, open_row, scene_of
-from verification.table import Row, Table
+from verification.table import Columns, Row, Table
 
 WORLD = "IAPB"
 REFINEMENTS = {"quick": (1, 2, 4), "full": (1, 2, 4, 8)}
@@ -88,5 +88,5 @@ SCENES = Check(
     cases=lambda study: scene_names(),
     row=_row,
     targets=_targets,
-    prose=("stopped",),
+    columns=Columns(prose=("stopped",)),
 )

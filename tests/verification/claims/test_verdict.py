@@ -35,18 +35,19 @@ from verification.finding import (
     with_failures,
 )
 from verification.region import LEAST_CONFIRMING, Region, search_region
-from verification.table import table_from
+from verification.table import Columns, table_from
 
 YES = True
 NO = False
 UNKNOWN = None
 
 
-def table(rows, holds, **marks):
+TWO_CONDITIONS = Columns(conditions=("tilt", "width"))
+
+
+def table(rows, holds, kinds=TWO_CONDITIONS):
     """A judged table of these rows, by default with two conditions."""
-    return replace(
-        table_from(rows, **(marks or {"condition": ["tilt", "width"]})), holds=tuple(holds)
-    )
+    return replace(table_from(rows, kinds=kinds), holds=tuple(holds))
 
 
 @pytest.mark.parametrize(
@@ -138,8 +139,7 @@ CLAIM = Check(
     question="?",
     cases=lambda study: (),
     row=lambda study, case: case,
-    parts=["part"],
-    conditions=["tilt"],
+    columns=Columns(parts=("part",), conditions=("tilt",)),
     holds=lambda row: row["error"] < 1.0,
 )
 
@@ -181,7 +181,7 @@ def test_fewer_than_ten_trials_that_can_tell_decide_nothing(held, failed, verdic
 
 def test_a_row_may_be_many_trials_of_which_some_fail():
     rows = [{"impacts": 8, FAILING: 0}, {"impacts": 7, FAILING: 2}, {"impacts": 5, FAILING: 0}]
-    part = judge_part("x", table(rows, [YES, NO, UNKNOWN], cases=["impacts"]))
+    part = judge_part("x", table(rows, [YES, NO, UNKNOWN], Columns(counts=("impacts",))))
     assert (part.held, part.decided, part.unknown, part.verdict) == (13, 15, 5, MIXED)
 
 

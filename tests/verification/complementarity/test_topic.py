@@ -23,7 +23,7 @@ def test_friction_is_coulombs_law_where_all_push_and_never_gains(
     monkeypatch.setitem(extensions.COUNTS, "quick", 15)
     table = FRICTION.table(Study(), [(e, mu) for e in (0.0, 1.0) for mu in (0.2, 0.8)])
     plastic, elastic = (table.where(e=e).records() for e in (0.0, 1.0))
-    assert sum(table.column("all contacts push")) > 10 and table.passed
+    assert sum(table["all contacts push"]) > 10 and table.passed
     assert all(row["NCP gains"] == 0 for row in plastic)
     assert any(row["NCP gains"] > 0 and row["friction reduced"] > 0 for row in elastic)
     for wrong in ({"share equal to the NCP": -1}, {"largest change of KE, IAPB": 1e-9}):

@@ -43,8 +43,8 @@ def test_pairs_tested_grow_linearly_where_all_pairs_grow_quadratically() -> None
     """All pairs give 2 in the limit; the density of the field, and with it the neighbours of a
     disc, changes a little."""
     costs = steps.BODIES.table(Study(), (20, 60))
-    assert growth.power_law(costs.column("bodies"), costs.column("pairs tested")) < 1.2
-    assert growth.power_law(costs.column("bodies"), costs.column("pairs of shapes")) > 1.9
+    assert growth.power_law(costs["bodies"], costs["pairs tested"]) < 1.2
+    assert growth.power_law(costs["bodies"], costs["pairs of shapes"]) > 1.9
 
 
 def test_methods_called_from_python_are_timed_on_the_same_impact() -> None:

@@ -27,21 +27,16 @@ def measured() -> Table:
 def test_a_small_study_is_complete_and_its_answers_are_right(measured: Table) -> None:
     ways = [way for way in study.WAYS if way.rows < 3]
     assert len(measured.rows) == 9 * len(ways)
-    assert min(measured.where(outcome="ok").column("time")) > 0.0
+    assert min(measured.where(outcome="ok")["time"]) > 0.0
     ours = measured.where(method=study.IAPB, work="all rows")
-    assert set(ours.column("outcome")) == {"ok"}
-    assert (
-        max(ours.column("relative error")) < 1e-12
-        and max(ours.column("relative energy gain")) == 0.0
-    )
+    assert set(ours["outcome"]) == {"ok"}
+    assert max(ours["relative error"]) < 1e-12 and max(ours["relative energy gain"]) == 0.0
     one, two = (
-        max(measured.where(method=study.IAPB, work=rows).column("relative error"))
+        max(measured.where(method=study.IAPB, work=rows)["relative error"])
         for rows in ("1 row", "2 rows")
     )
     assert one > two > 1e-12
-    assert (
-        max(measured.where(method=study.SWEEPS, work="1024 sweeps").column("relative error")) < one
-    )
+    assert max(measured.where(method=study.SWEEPS, work="1024 sweeps")["relative error"]) < one
 
 
 def rows_of(ways: dict[str, list[tuple[float, ...]]]) -> Table:

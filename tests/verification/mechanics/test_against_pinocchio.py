@@ -45,11 +45,11 @@ def cases(*sets):
 def test_every_set_is_compared_and_agrees():
     table = study.AGAINST_PINOCCHIO.table(Study())
     assert table.passed and all(value is not None for row in table.rows for value in row)
-    of = {name: table.where(set=name).column("mechanism") for name in set(table.column("set"))}
+    of = {name: table.where(set=name)["mechanism"] for name in set(table["set"])}
     assert {name.split()[1] for name in of["joint kinds"]} == set(KINDS)
     assert {"peg_corner", "tumbling_body", "arm_obstacles"} <= set(of["scenes"])
     assert [name.split()[-1] for name in of["random trees"]] == list(map(str, study.TREE_SIZES))
-    assert table.where(set=study.OTHERS).column("base") == ["fixed", "floating"]
+    assert table.where(set=study.OTHERS)["base"] == ["fixed", "floating"]
     assert {part.verdict for part in study.AGAINST_PINOCCHIO.judge(table)} == {REPRODUCED}
 
 

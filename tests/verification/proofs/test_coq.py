@@ -209,4 +209,4 @@ def test_a_strange_axiom_refutes(axioms: tuple[str, ...], verdict: str) -> None:
     others = replace(theorem, name="compensated", axioms=axioms)
     finding = on_proofs([], development=checked.Development("8.16.1", (theorem, others)))
     assert finding.parts[1].verdict == verdict
-    assert finding.tables["theorems about the code"].column("Coq") == ["yes", "yes"]
+    assert finding.tables["theorems about the code"]["Coq"] == ["yes", "yes"]

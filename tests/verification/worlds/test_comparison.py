@@ -55,7 +55,7 @@ def test_a_hinge_and_a_ball_count_by_their_inertia(monkeypatch):
     assert row(found, "PB")["configuration, end"] == pytest.approx(np.sqrt(squares / 8.5), rel=1e-9)
     overlap = -runs["PB"].contacts.gap.min()
     assert row(found, "PB")["deepest overlap"] == pytest.approx(1e3 * overlap)
-    seen = found.tables["over time"].where(world="PB").column("penetration")
+    seen = found.tables["over time"].where(world="PB")["penetration"]
     assert len(seen) == 11 and max(seen) == pytest.approx(overlap)
     lost = 1.045 - runs["IAPB"].energy["kinetic"][-1]  # ½ 0.5 (0.3² + 2²) at the start
     assert row(found, "IAPB")["energy lost"] == pytest.approx(lost - 0.0225, abs=1e-9)
@@ -70,7 +70,7 @@ def test_a_world_that_fails_is_named_and_the_others_are_compared(monkeypatch):
     monkeypatch.setattr(worlds, "run_world", breaks)
     short = SLOPE.with_values({"duration": 0.002})
     found = compare_worlds(short, ["IAPB", "PB", "ideal"], "ideal")
-    assert found.tables["worlds"].column("world") == ["IAPB", "ideal"]
+    assert found.tables["worlds"]["world"] == ["IAPB", "ideal"]
     assert found.verdict == NOT_COMPUTED
     assert [(one.case, one.reason) for one in found.failures] == [("world PB", "no solution")]
     with pytest.raises(
