@@ -17,7 +17,7 @@ from iapb.worlds import find_world
 from reference.one_thread import one_thread
 from reports.store.folder import Place, RunStore
 from reports.store.runs import RunEntry
-from reports.uses import StoredFile, run_command
+from reports.store.uses import StoredFile, run_command
 
 Progress = Callable[[int, int], None]
 

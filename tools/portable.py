@@ -323,8 +323,8 @@ def run_report(name: str, setting: dict[str, str], folder: Path, workers: str) -
     """Run `iapb reproduce`; return its exit status and a comparison with the outcomes of the
     default."""
     from iapb import IapbError
-    from reports.difference import EXACT, TIMING, compare_reports
-    from reports.numbers_file import read_numbers
+    from reports.pages.difference import EXACT, TIMING, compare_reports
+    from reports.pages.numbers_file import read_numbers
 
     here = folder / name / "report"
     if not (here / "status").is_file():

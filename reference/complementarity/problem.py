@@ -60,17 +60,20 @@ class ImpactProblem:
         """Return the problem of an impact of velocity v (d,) on rows J (n, d) with mass matrix M
         (d, d).
 
-        The contact velocities of dependent rows are made consistent: opposed rows contradict each
-        other in the rounding of J v, which is as large as |v|, and no solver finds an answer then.
+        The contact velocities of dependent rows are made consistent, and those that are rounding
+        are 0: opposed rows contradict each other in the rounding of J v, which is as large as |v|,
+        and no solver finds an answer then.
         """
         v = _array("velocity", velocity, (None,))
         mass = _array("mass_matrix", mass_matrix, (len(v), len(v)))
         jacobian = _array("contact_jacobian", contact_jacobian, (None, len(v)))
         factor = _mechanical_factor(mass, jacobian)
         contacts = _contacts(len(jacobian), contact_size, restitution, friction, relaxed, name)
+        gamma = _consistent(mass, factor, jacobian @ v)
+        rounding = len(v) * np.finfo(np.float64).eps * (np.abs(jacobian) @ np.abs(v))
         return cls(
             factor @ factor.T,
-            _consistent(mass, factor, jacobian @ v),
+            np.where(np.abs(gamma) > rounding, gamma, 0.0),
             **contacts,
             mass_matrix=mass,
             contact_jacobian=jacobian,

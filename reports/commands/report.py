@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from iapb.errors import ArgumentError
-from reports.difference import (
+from reports.pages.difference import (
     DIFFERS,
     PARTS,
     SHOWN,
@@ -20,8 +20,8 @@ from reports.difference import (
     sentences,
     unlike,
 )
-from reports.difference import lines as largest
-from reports.numbers_file import read_numbers
+from reports.pages.difference import lines as largest
+from reports.pages.numbers_file import read_numbers
 from reports.show import Answer, Json
 from verification.table import Table, titled
 
@@ -44,7 +44,7 @@ def report(
     json_: Json = False,
 ) -> Answer:
     """Compare the numbers of two reports: equal, within a tolerance, or different; end with 1 if
-    some differ."""
+    some differ or are in one report only."""
     if not math.isfinite(tolerance):
         raise ArgumentError("--tolerance", tolerance, "a finite number, 0 or more")
     first = read_numbers(old)
@@ -77,4 +77,4 @@ def report(
     if count:
         lines.append(f"The largest {min(count, SHOWN)} of {count} differences:")
         lines += [f"  {line}" for line in largest(found)]
-    return Answer(facts, [*lines, *sentences(found, tolerance)], 1 if count else 0)
+    return Answer(facts, [*lines, *sentences(found, tolerance)], 0 if found.agree else 1)

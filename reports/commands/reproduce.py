@@ -27,11 +27,11 @@ from reports.figures.figure import TEXTS, Recipe, draw
 from reports.pages.builder import build_report, draw_all, figure_inputs, figure_page
 from reports.pages.first import count_claims
 from reports.pages.records import FailedCases
-from reports.report import write_companions, write_report
+from reports.pages.report import write_companions, write_report
 from reports.runner import Runner
 from reports.show import Answer, Json, stage_progress
 from reports.store.io import write_whole
-from reports.uses import parsed
+from reports.store.uses import parsed
 from verification.finding import REPRODUCED, Failure, Finding
 
 

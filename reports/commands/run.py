@@ -20,7 +20,7 @@ from iapb.worlds import find_world
 from reports.runner import Runner
 from reports.show import Answer, Json, duration, one_line, stage_progress
 from reports.store.io import blocks
-from reports.uses import parsed
+from reports.store.uses import parsed
 
 SceneName = Annotated[
     str,

@@ -21,7 +21,7 @@ from reports.provenance import collect_provenance, this_machine
 from reports.runner import Runner
 from reports.store.keys import evidence_version, hash_of, plain
 from reports.store.records import read_record, write_record
-from reports.uses import StoredFile
+from reports.store.uses import StoredFile
 from verification.finding import Failure, attempt
 
 _LAYOUT = 5  # of the files

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from reports.uses import StoredFile
+from reports.store.uses import StoredFile
 from verification.finding import Failure, Finding
 from verification.table import Table
 

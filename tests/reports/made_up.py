@@ -9,9 +9,9 @@ from reference.worlds import run_world
 from reports.evidence.runs import CORNER_SCENE, FIGURE_RUNS, TILTED, corner_scene
 from reports.figures.corner import UNLIMITED
 from reports.figures.paper import arm_energies
-from reports.numbers_file import read_numbers
+from reports.pages.numbers_file import read_numbers
 from reports.pages.records import Evidence
-from reports.uses import StoredFile
+from reports.store.uses import StoredFile
 from verification.finding import MIXED, REFUTED, REPRODUCED, Part, finding_of
 from verification.table import titled
 

@@ -14,7 +14,7 @@ import pytest
 
 from reports.figures import RECIPES
 from reports.pages.builder import build_report, draw_all
-from reports.report import write_report
+from reports.pages.report import write_report
 from tests.reports.made_up import EVIDENCE, figure_inputs
 
 pytestmark = pytest.mark.thorough

@@ -12,15 +12,15 @@ import pytest
 
 from iapb.scene import find_scene, load_scene
 from reports import provenance
-from reports.crate import CRATE_NAME
 from reports.evidence import gather
 from reports.evidence.stage import Stage
 from reports.figures.figure import Figure, Panel
-from reports.numbers_file import NUMBERS_NAME, read_numbers
 from reports.pages.builder import build_report
+from reports.pages.crate import CRATE_NAME
+from reports.pages.numbers_file import NUMBERS_NAME, read_numbers
 from reports.pages.page import FIRST_PAGE
 from reports.pages.records import Evidence
-from reports.report import write_companions, write_report
+from reports.pages.report import write_companions, write_report
 from reports.runner import Runner
 from verification.finding import REPRODUCED, Finding, Part, finding_of
 from verification.table import titled

@@ -7,16 +7,16 @@ import pytest
 from jinja2 import UndefinedError
 
 from iapb.errors import ArgumentError
-from reports.crate import CRATE_NAME
 from reports.figures.figure import Figure, Panel
-from reports.numbers_file import NUMBERS_NAME
 from reports.pages.builder import ROWS_SHOWN, _environment, build_report, draw_all, link_across
 from reports.pages.cells import by_agreement, method_map
+from reports.pages.crate import CRATE_NAME
 from reports.pages.formulas import prose
 from reports.pages.numbers import ABSENT, num, numbers_of, percent, time, times
+from reports.pages.numbers_file import NUMBERS_NAME
 from reports.pages.page import FIRST_PAGE, PAGES
 from reports.pages.records import Evidence
-from reports.report import LARGEST_FIRST, write_report
+from reports.pages.report import LARGEST_FIRST, write_report
 from tests.reports.made_up import EVIDENCE, RUNS, one
 from verification.numbers import value_tables
 from verification.table import titled

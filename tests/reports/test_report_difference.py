@@ -7,8 +7,9 @@ from dataclasses import replace
 import pytest
 
 from iapb.errors import RunFileError
-from reports import cli, difference
-from reports.difference import (
+from reports import cli
+from reports.pages import difference
+from reports.pages.difference import (
     CLOSE,
     DIFFERS,
     EXACT,
@@ -18,7 +19,7 @@ from reports.difference import (
     compare_reports,
     unlike,
 )
-from reports.numbers_file import NUMBERS_NAME, ReportNumbers, read_numbers, write_numbers
+from reports.pages.numbers_file import NUMBERS_NAME, ReportNumbers, read_numbers, write_numbers
 from verification.table import Columns, titled
 
 TABLE = titled(
@@ -142,10 +143,16 @@ def test_what_keeps_runs_from_repeating_is_named():
 def test_the_command_counts_everything_and_ends_with_1_only_where_results_differ(tmp_path, capsys):
     more = replace(changed(0, "gain", 2.0), runs={"iapb run peg_corner": "d" * 64, "new": "e"})
     more = replace(more, tables={"claims/C07": more.tables["claims/C07"], "extra": TABLE})
-    for name, report in (("a", REPORT), ("b", changed(0, "median [µs]", 99.0)), ("c", more)):
+    for name, report in (
+        ("a", REPORT),
+        ("b", changed(0, "median [µs]", 99.0)),
+        ("c", more),
+        ("d", changed(0, "gain", 2.0)),
+        ("e", replace(REPORT, tables=REPORT.tables | {"extra": TABLE})),
+    ):
         (tmp_path / name).mkdir()
         write_numbers(tmp_path / name / NUMBERS_NAME, report)
-    a, b, c = (str(tmp_path / name) for name in "abc")
+    a, b, c, d, e = (str(tmp_path / name) for name in "abcde")
     assert cli.main(["report", "diff", a, f"{b}/report.html"]) == 0
     capsys.readouterr()
     assert cli.main(["report", "diff", a, f"{c}/{NUMBERS_NAME}"]) == 1
@@ -157,7 +164,16 @@ def test_the_command_counts_everything_and_ends_with_1_only_where_results_differ
         "Of 1 runs behind both, 0 are the same to the last bit; 1 are behind one only.",
     ):
         assert words in said, words
-    assert cli.main(["report", "diff", a, c, "--tolerance", "0.5"]) == 0
+    assert cli.main(["report", "diff", a, d, "--tolerance", "0.5"]) == 0
+    assert cli.main(["report", "diff", a, e]) == cli.main(["report", "diff", e, a]) == 1
+
+
+def test_a_long_text_is_shown_from_where_it_differs():
+    long = "the same forty letters before both ends: "
+    table = titled(("row", "note"), (("one", f"{long}left"),))
+    other = titled(("row", "note"), (("one", f"{long}right"),))
+    [line] = difference.lines(compare_reports(only(t=table), only(t=other)))
+    assert "h ends: left -> " in line and "h ends: right" in line
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from reports.evidence import energy
 from reports.evidence.runs import FIGURE_RUNS, shipped_scene
 from reports.runner import Runner
 from reports.store import RunStore, content_hash, read_run, write_run
-from reports.uses import run_command
+from reports.store.uses import run_command
 from tests.reports.made_up import made_run
 from verification.check import Study
 

@@ -20,24 +20,44 @@ from reference.complementarity.solution import Answer, velocity_scale
 # of cone programs; change of the shift, share of the velocity scale, at which they stop
 _ROUNDS = 50
 _STILL = 1e-9
-# Backends and accuracy requested at unit W and b; the defaults are 1e-4 to 1e-6. Near the apex of
-# cones, the natural map reaches its square root. Without friction, below 1e-11, Clarabel drifts
-# along the unbounded set of impulses of opposed contacts (p to 6e9, residual up to 4e-6).
-_BACKENDS: dict[str, tuple[str, dict[str, Any]]] = {
-    "socp": ("CLARABEL", {"tol_gap_abs": 1e-12, "tol_gap_rel": 1e-12, "tol_feas": 1e-12}),
-    "CLARABEL": ("CLARABEL", {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11}),
-    "OSQP": (
-        "OSQP",
-        {
-            "eps_abs": 1e-9,
-            "eps_rel": 1e-9,
-            "max_iter": 20_000,
-            "polishing": True,
-            "time_limit": 10.0,
-        },
-    ),
-    "SCS": ("SCS", {"eps_abs": 1e-9, "eps_rel": 1e-9, "max_iters": 20_000}),
+# Backends and accuracies requested at unit W and b, until one has an answer; the defaults are 1e-4
+# to 1e-6. Near the apex of cones, the natural map reaches its square root. Without friction, below
+# 1e-11, Clarabel drifts along the unbounded set of impulses of opposed contacts (p to 6e9, residual
+# up to 4e-6); above, it ends without an answer in one impact of some 5,000.
+_BACKENDS: dict[str, tuple[str, tuple[float, ...]]] = {
+    "socp": ("CLARABEL", (1e-12, 1e-9)),
+    "CLARABEL": ("CLARABEL", (1e-11, 1e-9)),
+    "OSQP": ("OSQP", (1e-9,)),
+    "SCS": ("SCS", (1e-9,)),
 }
+
+
+def _settings(backend: str, accuracy: float) -> dict[str, Any]:
+    """Return cvxpy's arguments for a backend and its accuracy."""
+    if backend == "CLARABEL":
+        return dict.fromkeys(("tol_gap_abs", "tol_gap_rel", "tol_feas"), accuracy)
+    settings = {"eps_abs": accuracy, "eps_rel": accuracy}
+    if backend == "SCS":
+        return settings | {"max_iters": 20_000}
+    return settings | {"max_iter": 20_000, "polishing": True, "time_limit": 10.0}
+
+
+def _attempt(program: Any, backend: str, accuracies: tuple[float, ...]) -> str:
+    """Solve at the first accuracy that has an answer; return "", or why none has."""
+    import cvxpy as cp
+
+    failure = ""
+    for accuracy in accuracies:
+        try:
+            # "may be inaccurate": the status says so too, and residuals are recomputed
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)
+                program.solve(solver=backend, **_settings(backend, accuracy))
+        except cp.error.SolverError as error:
+            failure = f"{backend}: {error}"
+        else:
+            return ""
+    return failure
 
 
 def solve(problem: ImpactProblem, method: str) -> Answer:
@@ -48,7 +68,7 @@ def solve(problem: ImpactProblem, method: str) -> Answer:
     """
     import cvxpy as cp
 
-    backend, settings = _BACKENDS[method]
+    backend, accuracies = _BACKENDS[method]
     rows = problem.factor
     speed = velocity_scale(problem)
     mu = problem.friction_or_zero
@@ -70,13 +90,9 @@ def solve(problem: ImpactProblem, method: str) -> Answer:
         scaled = problem.offset / speed
         scaled[:: problem.contact_size] += shift
         offset.value = scaled
-        try:
-            # "may be inaccurate": the status says so too, and residuals are recomputed
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", UserWarning)
-                program.solve(solver=backend, **settings)
-        except cp.error.SolverError as error:
-            return Answer(None, f"{backend}: {error}")
+        failure = _attempt(program, backend, accuracies)
+        if failure:
+            return Answer(None, failure)
         impulse = None if p.value is None else np.asarray(p.value) * speed / root**2
         if impulse is None or problem.friction is None or problem.relaxed:
             ended = f" in round {done}" if impulse is None and problem.friction is not None else ""

@@ -13,9 +13,10 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import compress
+from os.path import commonprefix
 from typing import Any
 
-from reports.numbers_file import ReportNumbers
+from reports.pages.numbers_file import ReportNumbers
 from reports.provenance import PEERS, machine_parts
 from verification.table import Table
 
@@ -48,6 +49,7 @@ PARTS = (
 )
 SHOWN = 20  # lines; the rest is counted
 _WIDEST = 34  # letters of a cell
+_BEFORE = 10  # letters before the first that differs
 # Facts that must be equal for equal results to the last bit, besides those of the machine:
 # OPENBLAS_CORETYPE selects another BLAS kernel on the same processor. Some of the packages compared
 # with are not in the lock file.
@@ -85,6 +87,12 @@ class Difference:
     runs_same: int
     runs_other: tuple[str, ...]
     runs_single: int
+
+    @property
+    def agree(self) -> bool:
+        """Whether no cell differs, and both reports have the same cells and tables."""
+        apart = self.count(DIFFERS) + self.count(ONLY_OLD) + self.count(ONLY_NEW)
+        return not (apart or self.tables_old or self.tables_new)
 
     def count(self, state: str) -> int:
         """Return the number of cells in a state."""
@@ -232,9 +240,12 @@ def lines(found: Difference) -> Iterator[str]:
     relative difference."""
     for cell in found.of(DIFFERS)[:SHOWN]:
         share = f" ({cell.gap:.1e} of it)" if math.isfinite(cell.gap) else ""
+        old = str(cell.old)
+        new = str(cell.new)
+        start = max(len(commonprefix([old, new])) - _BEFORE, 0)
         yield (
             f"{cell.table}, row {_short(cell.row)}, {_short(cell.column)}: "
-            f"{_short(str(cell.old))} -> {_short(str(cell.new))}{share}"
+            f"{_short(old, start)} -> {_short(new, start)}{share}"
         )
 
 
@@ -253,8 +264,13 @@ def parts(found: Difference) -> Iterator[tuple[str, ...]]:
         yield part, *(str(sum(count[state] for state in states) or "") for _, states in PARTS)
 
 
-def _short(text: str) -> str:
-    return text if len(text) <= _WIDEST else text[: _WIDEST - 1] + "…"
+def _short(text: str, start: int = 0) -> str:
+    """Return a text of at most _WIDEST letters; a longer one without the letters before `start`."""
+    if len(text) <= _WIDEST:
+        return text
+    lead = "…" if start else ""
+    rest = lead + text[start:]
+    return rest if len(rest) <= _WIDEST else rest[: _WIDEST - 1] + "…"
 
 
 def unlike(old: Mapping[str, str], new: Mapping[str, str]) -> tuple[str, ...]:

@@ -11,9 +11,9 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from iapb.errors import ArgumentError
-from reports.crate import write_crate
 from reports.figures.figure import Figure
-from reports.numbers_file import NUMBERS_NAME, collect_numbers, write_numbers
+from reports.pages.crate import write_crate
+from reports.pages.numbers_file import NUMBERS_NAME, collect_numbers, write_numbers
 from reports.pages.page import FIRST_PAGE
 from reports.pages.records import Evidence
 from reports.store.io import write_whole
