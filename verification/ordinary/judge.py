@@ -11,7 +11,8 @@ from iapb.run import Run
 from iapb.scene.reading import scene_from_values
 from reference.worlds import run_world
 from verification.check import Check, Study, no_row_fails
-from verification.ordinary.scenes import CASES, FAMILIES, Motion
+from verification.ordinary.quantities import Motion
+from verification.ordinary.scenes import CASES
 from verification.table import Row
 
 OURS = "IAPB"
@@ -48,7 +49,7 @@ def _row(study: Study, name: str) -> Row:
     }
     return {
         "scene": name,
-        "family": FAMILIES[name],
+        "family": CASES[name].family,
         "known": CASES[name].says,
         "allowed, of the scale": CASES[name].tolerance,
         **{f"error of {title}, of the allowed": error for title, error in errors.items()},
