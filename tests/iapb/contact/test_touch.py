@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from iapb.contact.laws import ImpulseAugmented
 from iapb.haptics.coupling import Coupling, FourChannel, NoCoupling
 from iapb.scene import Scene, scene_from_text
-from iapb.scene.reading import scene_from_values
 from iapb.simulation import simulate
 from tests.given import data_of, scene_with
 from verification.certificate import certify
-from verification.ordinary.touch import INERTIA, G, heights, toss_values, tossed
+from verification.ordinary.touch import BOX, G, heights, toss, tossed
 
 # Some ten impacts multiply the rounding of a touch (1e-15 m) by ten each at worst.
 EXACT = 1e-8
@@ -31,9 +30,8 @@ def toss_scene(
     restitution: float = 0.6,
     seconds: float = 0.4,
 ) -> Scene:
-    values = toss_values(state, restitution, friction, seconds)
-    contact = values["contact"] | {"impact_time": rule}
-    return scene_from_values(values | {"rate": rate, "contact": contact})
+    scene = toss(state, restitution, friction, seconds)
+    return scene.with_values({"rate": rate, "contact.impact_time": rule})
 
 
 def states(count: int, seed: int) -> list[NDArray[np.float64]]:
@@ -47,8 +45,9 @@ def states(count: int, seed: int) -> list[NDArray[np.float64]]:
 @pytest.mark.parametrize("rate", [250.0, 1000.0])
 def test_a_tossed_box_lands_where_it_should(rate: float, friction: float) -> None:
     for state in states(4, seed=2):
-        truth, impacts = tossed(state, 0.6, friction, 0.4)
-        run = simulate(toss_scene(state, rate, friction))
+        scene = toss_scene(state, rate, friction)
+        truth, impacts = tossed(scene)
+        run = simulate(scene)
         assert np.abs(run.q[-1] - truth).max() < EXACT
         assert len(run.impacts.step) == impacts
 
@@ -103,7 +102,7 @@ def test_corners_of_a_fast_spin_touch_without_overlap() -> None:
     """Seen from an overlap, Newton's method may look before the touch; it comes back from the gap."""
     start = np.array([0.0, 0.4, 0.7, 0.3, 0.0, 3.0])
     run = simulate(toss_scene(start, 1000.0, restitution=1.0, seconds=3.0))
-    energy = 0.5 * (run.v**2 @ np.array([1.0, 1.0, INERTIA])) + G * run.q[:, 1]
+    energy = 0.5 * (run.v**2 @ np.array([1.0, 1.0, BOX.inertia])) + G * run.q[:, 1]
     touches = [heights(q, np.zeros(3), 0.0).min() for q in run.impacts.q]
     assert len(touches) > 8
     # A gap below 1e-12 (1 + |x| + |y|) counts as a touch; the fault left 2e-7.
