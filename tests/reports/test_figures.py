@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from iapb.scene import find_scene, load_scene
 from reports.figures import RECIPES
 from reports.figures.condition_map import condition_map
 from reports.figures.corner import _same_9
-from reports.figures.figure import draw
+from reports.figures.figure import diagram, draw
 from reports.figures.numbers import format_number
-from reports.figures.paper import arm_energies
+from reports.figures.paper import CONTACTS, arm_energies
 from reports.figures.plot import Plot
 from reports.figures.style import OUTCOMES, STYLES, VARIABLES
 from tests.reports.made_up import figure_inputs
@@ -101,3 +102,33 @@ def test_a_map_counts_what_holds_and_keeps_the_numbers_of_its_axes(monkeypatch):
     assert "2 of 3" in panel.alt and "0.001" in re.findall(r">([\d.]+)</text>", panel.svg)
     crossed = [found for look, found in marks if look == OUTCOMES["fails"]]
     assert crossed == [[[1.0, 0.0]]] and len(marks) == 3  # a full dot, a smaller one
+
+
+def test_the_frozen_drawing_of_the_peg_is_its_scene():
+    drawing = diagram("peg", "").svg
+    right, floor = (
+        float(re.search(pattern, drawing).group(1))  # type: ignore[union-attr]
+        for pattern in (r'"M(\S+) 7036', r'"M\S+ (155\.\d+)L')
+    )
+    outline = re.search(r'"M([^"]*)z"[^>]*--peg', drawing).group(1)  # type: ignore[union-attr]
+    corners = np.array([point.split() for point in outline.split("L")], float)
+    scene = load_scene(find_scene("peg_corner"))
+    width, height = scene.bodies[0].shapes[0].size
+    sides = np.linalg.norm(np.diff(corners, axis=0), axis=1)
+    scale = sides[0] / width
+    along = corners[1] - corners[0]
+    x, y = corners.mean(axis=0)
+    seen = ((right - x) / scale, (y - floor) / scale, -np.arctan2(along[1], along[0]))
+    assert sides[1] / scale == pytest.approx(height, rel=1e-3)
+    assert seen == pytest.approx(scene.bodies[0].position, abs=2e-5)
+
+
+def test_the_frozen_drawing_of_the_arm_is_struck_where_the_text_says():
+    drawing = diagram("arm", "").svg
+    joint, tip = (float(y) for y in re.search(r"M129.6 (113\S+)L129.6 (\S+)", drawing).groups())  # type: ignore[union-attr]
+    arrows = [float(y) for y in re.findall(r'"M86\.95 (\S+)Q', drawing)]
+    assert [(joint - y) / (joint - tip) for y in arrows] == pytest.approx(
+        [*CONTACTS.values()], abs=1e-3
+    )
+    for name, distance in CONTACTS.items():
+        assert f">{name}, {distance} m<" in drawing
