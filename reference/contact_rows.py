@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from iapb.contact.finding import Contacts
 from iapb.mechanics.mechanism import Mechanism
+from iapb.system import System
 from reference import Floats
 from reference.rigid_body import PinocchioMechanism, model_of
 
@@ -28,7 +29,7 @@ _mechanics: WeakKeyDictionary[Mechanism, PinocchioMechanism] = WeakKeyDictionary
 _solids: WeakKeyDictionary[Mechanism, _Solids] = WeakKeyDictionary()
 
 
-def mechanics_of(system: Any) -> PinocchioMechanism:
+def mechanics_of(system: System) -> PinocchioMechanism:
     """Return Pinocchio's model of the system's mechanism, built once."""
     if system.mechanism not in _mechanics:
         _mechanics[system.mechanism] = model_of(system.mechanism)
@@ -45,7 +46,7 @@ class ContactRows:
     gamma: Floats  #: (c,) J v [m/s]
 
 
-def find_rows(system: Any, q: Floats, v: Floats, margin: float) -> ContactRows:
+def find_rows(system: System, q: Floats, v: Floats, margin: float) -> ContactRows:
     """Return the contacts of `system` at q (nq,) with gap <= margin [m]."""
     axes, origins, frames = mechanics_of(system).bodies(q)
     geometry = system.finder.find(axes, origins, margin)
@@ -73,7 +74,7 @@ class _Solids(NamedTuple):
     body: NDArray[np.int64]  # (n,)
 
 
-def _solids_of(system: Any) -> _Solids:
+def _solids_of(system: System) -> _Solids:
     """Return the shapes in the axes of their bodies, made once."""
     if system.mechanism in _solids:
         return _solids[system.mechanism]
@@ -136,7 +137,7 @@ def _grazing(shape_a, shape_b, gap, solids, axes, origins):  # type: ignore[no-u
 
 
 def _with_stops(
-    geometry: Contacts, system: Any, q: Floats, origins: Floats, frames: Floats, margin: float
+    geometry: Contacts, system: System, q: Floats, origins: Floats, frames: Floats, margin: float
 ) -> Contacts:
     """Append the joint limits with gap <= margin [m], as contacts on an arm that the joint
     rotates."""
@@ -215,7 +216,7 @@ def _rows(directions, points, bodies_a, bodies_b, origins, frames):  # type: ign
     return rows
 
 
-def tangent_rows(system: Any, q: Floats, found: ContactRows) -> tuple[Floats, Floats]:
+def tangent_rows(system: System, q: Floats, found: ContactRows) -> tuple[Floats, Floats]:
     """Return unit tangents t (c, s, 3) of the contacts and their rows tᵀ(J_a − J_b) (c, s, d).
 
     In the plane s = 1 and t = z × n; in space s = 2 and (n, t_1, t_2) is right-handed.
@@ -285,7 +286,7 @@ def write_contacts(
 
 
 def write_impact(
-    state: Any, system: Any, v: Floats, mass: Floats, impulse: Floats, rows: Floats
+    state: Any, system: System, v: Floats, mass: Floats, impulse: Floats, rows: Floats
 ) -> None:
     """Log the collision impulses of a step as one impact, from v before, mass matrix, impulse (d,)
     and rows (c, d)."""

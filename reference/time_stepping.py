@@ -25,6 +25,7 @@ from iapb.errors import ArgumentError
 from iapb.names import one_of
 from iapb.run import COLLIDING, FREE, RESTING
 from iapb.scene.mechanism import restitution_by_pair
+from iapb.system import System
 from reference import Floats, contact_rows
 from reference.free_motion import free_motion
 from reference.one_thread import one_thread
@@ -93,7 +94,7 @@ class RigidConstraints:
             "restitution where Newton's law has no solution or gains energy": "Poisson",
         }
 
-    def cost(self, system: Any) -> Cost:
+    def cost(self, system: System) -> Cost:
         """Estimate the cost of a step from the scene alone, with the contacts of every pair of
         shapes, near or far.
 
@@ -109,7 +110,7 @@ class RigidConstraints:
         return Cost(contacts, d, SECONDS_A_STEP + SECONDS_AN_ENTRY * contacts * d)
 
     @one_thread()
-    def advance(self, system: Any, state: Any, applied_force: Floats, dt: float) -> StepResult:
+    def advance(self, system: System, state: Any, applied_force: Floats, dt: float) -> StepResult:
         """Do one step (see `iapb.contact.laws.ContactLaw`).
 
         Impulses are reported as collision impulses at contacts that approached faster than the
@@ -183,7 +184,7 @@ class RigidConstraints:
 
     def _solve(
         self,
-        system: Any,
+        system: System,
         mass: Floats,
         q: Floats,
         v: Floats,
@@ -229,7 +230,7 @@ def _sum_of(found: contact_rows.ContactRows, solved: _Solved, chosen: NDArray[np
     return np.asarray((found.jacobian.T * solved.normal + solved.dragging)[:, chosen].sum(axis=1))
 
 
-def _share_before(system: Any, state: Any) -> float:
+def _share_before(system: System, state: Any) -> float:
     """Return the share of a step in which the mechanism moves before forces and contacts act.
 
     It is a half, Moreau's midpoint, which makes smooth motion of order two. It is 0 with a hand,

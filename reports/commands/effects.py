@@ -10,6 +10,7 @@ import typer
 from iapb import decide_effects
 from iapb.effects import ignored_fields
 from iapb.errors import ArgumentError
+from iapb.scene import Scene
 from iapb.worlds import find_world
 from reports.commands.run import Rendering, SceneName, scene_given
 from reports.show import Answer, Json, stage_progress
@@ -59,7 +60,7 @@ def effects(
     return Answer({"scene": source.name, "world": world, "effects": found}, lines)
 
 
-def _measured(source: Any, world: str) -> Answer:
+def _measured(source: Scene, world: str) -> Answer:
     """Return what changes without each effect, and the time that the effects which are off save."""
     if world not in ("IAPB", "PB"):
         raise ArgumentError(
