@@ -7,15 +7,13 @@ Prints:
     holds
 """
 
-from typing import Any
-
 import numpy as np
 
 from iapb import resolve_impact
 from verification.check import Check, Study
 from verification.claims import CLAIMS, check_claims
 from verification.impacts import Family, draw_of_rank
-from verification.table import Columns
+from verification.table import Columns, Row
 
 
 def contacts(study: Study) -> tuple[int, ...]:
@@ -23,7 +21,7 @@ def contacts(study: Study) -> tuple[int, ...]:
     return (1, 4, 20)
 
 
-def resolved_twice(study: Study, contacts: int) -> dict[str, Any]:
+def resolved_twice(study: Study, contacts: int) -> Row:
     """Return the row of one number of contacts: the largest change by the second impact."""
     family = Family(6, contacts, min(contacts, 4), 1e4)
     changes = []
@@ -41,7 +39,7 @@ def resolved_twice(study: Study, contacts: int) -> dict[str, Any]:
     }
 
 
-def stays(row: dict[str, Any]) -> bool:
+def stays(row: Row) -> bool:
     """Return whether the change is rounding."""
     return bool(row["change"] <= row["bound"])
 

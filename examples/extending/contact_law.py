@@ -1,5 +1,6 @@
 """A contact law beside the engine's: an impulse stops every approaching contact in each step.
 
+In the project it is a file of `reference`; `reference.contact_rows.write_contacts` records contacts.
 `simulate(scene, law=...)` needs no registration. One line of `WORLDS` makes it a world by name, for
 `iapb run --world impulses`. An attribute `uses` names the parts of the contact section that the law
 uses (`iapb.contact.laws`).

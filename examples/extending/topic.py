@@ -1,7 +1,7 @@
 """A topic of the report: for how much of the time the peg touches the corner, by world.
 
 In the project it is a file of `verification` or reports/evidence, and one line of `TOPICS` in
-reports/evidence/topics.py. Its pages quote its tables.
+reports/evidence/topics.py. A template of a page shows its tables.
 
 Prints:
     reproduced

@@ -26,14 +26,13 @@ _FILES = (
     "socket",
     "speed",
 )
-CLAIMS: dict[str, Check] = dict(
-    sorted(
-        (name, claim)
-        for file in _FILES
-        for name, claim in vars(import_module(f"{__name__}.{file}")).items()
-        if isinstance(claim, Check) and name == claim.key
-    )
-)
+_MADE = {
+    claim.key: claim
+    for file in _FILES
+    for claim in vars(import_module(f"{__name__}.{file}")).values()
+    if isinstance(claim, Check)
+}
+CLAIMS: dict[str, Check] = {key: _MADE[key] for key in sorted(_MADE)}
 
 
 def check_claims(

@@ -100,8 +100,8 @@ def solve(problem: ImpactProblem, solver: str = "daqp") -> Solution:
             raise SolverError(f"refused: takes {kind} only")
         answer = (
             call(problem, *filter(None, [entry.option]))
-            if problem.size
-            else Answer(np.zeros(0), "no contacts")
+            if problem.offset.any()
+            else Answer(np.zeros(problem.size), "b = 0: no impulse is needed")
         )
     except SolverError as error:
         answer = Answer(None, str(error), refused=str(error).startswith("refused"))
@@ -138,9 +138,8 @@ def _load(solver: str, entry: SolverEntry) -> Callable[..., Answer]:
     try:
         for package in entry.package.split():
             import_alone(package)
-        module = importlib.import_module(entry.module)
     except ImportError as error:
         install = "pip install " + entry.package.replace("pinocchio", "pin")
         raise MissingDependencyError(entry.package, f"solver {solver!r}", install) from error
-    found: Callable[..., Answer] = module.solve
+    found: Callable[..., Answer] = importlib.import_module(entry.module).solve
     return found

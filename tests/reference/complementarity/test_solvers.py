@@ -241,7 +241,7 @@ def test_projection_obeys_moreau(x: list[float], mu: float) -> None:
     assert rest[0, 0] >= mu * np.linalg.norm(rest[0, 1:]) - 1e-12
 
 
-@pytest.mark.parametrize("name", ["daqp", "enumeration", "cvxpy_osqp"])
+@pytest.mark.parametrize("name", ["daqp", "enumeration", "cvxpy_osqp", "cvxpy_clarabel"])
 def test_opposed_contacts_whose_velocities_are_rounding_have_an_answer(name: str) -> None:
     """J v is rounding of v, and contradicts itself on dependent rows: J v = (1e-17, 1e-17) between
     two walls."""
@@ -255,6 +255,20 @@ def test_opposed_contacts_whose_velocities_are_rounding_have_an_answer(name: str
             ImpactProblem.from_impact(np.diag([1.0, 2.0, 0.1, 3.0]), rows, v, 0.5), name
         )
         assert np.abs(solution.velocity_plus - v).max() <= 1e-14
+
+
+def test_clarabel_answers_at_a_coarser_accuracy_where_it_has_none_at_its_finest() -> None:
+    """At 1e-11 it ends with "insufficient progress" on this impact."""
+    rows = [
+        [-0.28890221703031826, 0.68712190360312, -0.666632581399823],
+        [-0.03620332447787944, 0.8443086648825759, -0.5346327690115442],
+        [-0.23874456508595573, -0.8245166294050235, 0.5130042499594881],
+        [-0.00227005170381101, -0.7112722333852035, -0.7029129795931262],
+        [0.0, 0.0, 0.0],
+    ]
+    problem = ImpactProblem.from_impact(8.0 * np.eye(3), rows, [512.0, 0, 0], 0.25268255065800826)
+    solution = solve(problem, "cvxpy_clarabel")
+    assert solution.residuals.worst <= 1e-6
 
 
 @pytest.mark.parametrize(
