@@ -122,15 +122,18 @@ class Text:
             else self.shapes[letter.args[0].name][1 - side]
         )
 
+    def compares(self, formula: str) -> bool:
+        """Whether a comparison of numbers is true."""
+        left, sign, right = re.split(r"([=<≤>≥])", formula)
+        return Comparison(formula, self.read(left), sign, self.read(right)).is_true
+
     def same(self, one: Any, other: Any) -> bool:
         """Whether the values are equal; a number may be transposed."""
         rest = sympy.expand(one - other)
         return bool(sympy.expand(rest + rest.transpose() if self.is_number(rest) else rest) == 0)
 
 
-def refusal(
-    block: Block, certificates: Sequence[Sequence[str]], comparisons: Iterable[Comparison] = ()
-) -> str:
+def refusal(block: Block, certificates: Sequence[Sequence[str]]) -> str:
     """Return why SymPy refuses a step of the statement with these printed certificates; empty if it
     accepts all.
 
@@ -180,12 +183,10 @@ def refusal(
             if not text.same(rest, 0):
                 return f"'{name}': SymPy leaves {sympy.expand(rest)}"
         known.append(claim)
-    false = (
-        each.says
-        for each in comparisons
-        if not each._replace(left=sympy.Rational(each.left)).is_true
-    )
-    return next((f"'{says}': false for SymPy" for says in false), "")
+    for entry in block.all("numbers", "false"):
+        if entry.formula and text.compares(entry.formula) is (entry.key == "false"):
+            return f"'{entry.words}': SymPy finds the opposite"
+    return ""
 
 
 def holds(block: Block, formula: str, case: Case) -> bool:

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 from flint import fmpq, fmpq_mat
 
 from iapb.errors import ArgumentError
-from verification.proofs.words import ANY, Expression, Fact, names_in
+from verification.proofs.words import ANY, Expression, Fact, Reader, names_in
 
 Case = dict[str, fmpq_mat]
 _RELATIONS = {
@@ -27,6 +27,7 @@ _RELATIONS = {
     ">": operator.gt,
     "≥": operator.ge,
 }
+_SIDES = re.compile(r"\s*([=<≤>≥])\s*")
 _VALUE = re.compile(r"(\S+?)=(\[[^\]]*\]|\S+)")
 
 
@@ -34,13 +35,21 @@ class Comparison(NamedTuple):
     """A relation between two computed rationals; `says` describes it."""
 
     says: str
-    left: Fraction
+    left: Any
     relation: str
-    right: Fraction
+    right: Any
 
     @property
     def is_true(self) -> bool:
         return bool(_RELATIONS[self.relation](self.left, self.right))
+
+
+def read_comparison(says: str, formula: str) -> Comparison:
+    """Return a comparison of numbers, written as a formula without letters."""
+    left, relation, right = _SIDES.split(formula)
+    reader = Reader({})
+    low, high = (value_of(reader.expression(side), {})[0, 0] for side in (left, right))
+    return Comparison(says, low, relation, high)
 
 
 def read_case(text: str, names: Iterable[str], base: Mapping[str, fmpq_mat] | None = None) -> Case:

@@ -15,7 +15,8 @@ use      takes over the entries of another statement
 lemma    a step of the proof; show: one that is a conclusion
 sum      the terms of the last step that are not negative
 by       its cofactors, with equations in square brackets; or cancelling, dividing, dominating
-numbers  the comparisons of rational numbers that `numbers` computes
+numbers  a comparison of numbers; without a formula those that the module `numbers` computes
+false    a false comparison, with a title as a twin
 twin     a false variant
 
 An entry has the parts  WORDS :: FORMULA @ CASE -- NOTE;  only the formula is needed. The formula
@@ -61,6 +62,7 @@ _KEYS = _PROSE | {
     "sum",
     "by",
     "numbers",
+    "false",
     "twin",
 }
 

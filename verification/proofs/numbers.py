@@ -1,5 +1,5 @@
-"""Comparisons of rational numbers that statements contain, and false ones (twins), computed in
-exact fractions."""
+"""Comparisons of rational numbers that belong to a statement, and false ones (twins): those in its
+text, and those that only a program computes, such as ranks and rounded entries."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from verification.proofs.cases import (
     holds,
     matrix_of,
     pseudo_inverse,
+    read_comparison,
 )
 from verification.proofs.statement import Statement
 
@@ -34,109 +35,12 @@ def _is(says: str, left: Fraction | int, relation: str, right: Fraction | int | 
     return Comparison(says, Fraction(left), relation, Fraction(right))
 
 
-def unequal_restitution() -> tuple[Comparisons, Twins]:
-    """The bar's energies from its velocities: before the impact (−1, 0), after it with J v⁺ = (1,
-    0)."""
-    spin = 1 / (Fraction(1, 2) - Fraction(2, 5))
-    after = (-Fraction(2, 5) * spin) ** 2 / 2 + spin**2 / 24
-    return (
-        _is("the bar's energy after the impact, with v⁺ = (−4, 10)", after, "=", "73/6"),
-        _is("the bar's energy is larger than before the impact", after, ">", "1/2"),
-    ), ()
-
-
 def erratum_rank() -> tuple[Comparisons, Twins]:
     all_rows, left_over = (fmpq_mat([[1]] * count).rank() for count in (3, 2))
     return (
         _is("the rank of all three rows, so n = 1", all_rows, "=", 1),
         _is("the rank of the two rows left over", left_over, "=", 1),
     ), (("as printed", _is("rank(J_r) = r", left_over, "=", 2), ""),)
-
-
-def erratum_spreading() -> tuple[Comparisons, Twins]:
-    """A spread impulse, step by step; each step applies Newton's law anew: 2 kg, −0.1 m/s, e = 1/2,
-    15 N, 512 Hz."""
-    mass = Fraction(2)
-    speed = Fraction(-1, 10)
-    e = Fraction(1, 2)
-    most = Fraction(15, 512)
-    steps = 0
-    while speed < 0:
-        impulse = min(wanted := -(1 + e) * mass * speed, most)
-        speed = speed + impulse / mass
-        steps = steps + 1
-        if impulse == wanted:
-            break
-    return (
-        _is("steps taken: m = 2 kg, v = −0.1 m/s, e = 1/2, 15 N, 512 Hz", steps, "=", 7),
-        _is("velocity reached [m/s], instead of 0.05", speed, "<", "26/10000"),
-    ), (
-        (
-            "in numbers: the prescribed velocity",
-            _is("velocity reached [m/s]", speed, "=", "1/20"),
-            "",
-        ),
-    )
-
-
-def erratum_saturation() -> tuple[Comparisons, Twins]:
-    """The peg's energies for the full impulse and for the one clipped by the device: 15 N and 1 N m
-    for 1/512 s."""
-    mass = Fraction(2)
-    inertia = Fraction(1, 200)
-    arm = Fraction(1, 100)
-    speed = Fraction(-1, 10)
-    spin = Fraction(4)
-    p = -(speed + arm * spin) / (1 / mass + arm**2 / inertia)
-    force = min(p, Fraction(15, 512))
-    torque = min(arm * p, Fraction(1, 512))
-
-    def gained(force: Fraction, torque: Fraction) -> Fraction:
-        return force * speed + force**2 / (2 * mass) + torque * spin + torque**2 / (2 * inertia)
-
-    return (
-        _is("energy gained with the full impulse [J]", gained(p, arm * p), "<", 0),
-        _is("the impulse exceeds the force limit [N s]", p, ">", "15/512"),
-        _is("its moment is below the torque limit [N m s]", arm * p, "<", "1/512"),
-        _is("energy gained with the clipped impulse [J]", gained(force, torque), ">", 0),
-    ), (
-        (
-            "saturation is passive: the peg struck at its corner",
-            _is("energy gained with the clipped impulse [J]", gained(force, torque), "≤", 0),
-            "",
-        ),
-    )
-
-
-def spring_energy_after(*, implicit: bool) -> Fraction:
-    """Return KE⁺ + Φ⁺ of one mass on its spring, with the force of the step's end (implicit) or of
-    its start.
-
-    M = 1 kg at rest, K = 8 N/m, B = 0, φ = −1 m, h = 1 s.
-    """
-    speed = Fraction(8, 1 + 8 * implicit)
-    return speed**2 / 2 + 4 * min(speed - 1, Fraction(0)) ** 2
-
-
-def resting_contact() -> tuple[Comparisons, Twins]:
-    return (
-        _is("KE⁺ + Φ⁺ of one mass, implicit force [J]", spring_energy_after(implicit=True), "≤", 4),
-    ), (
-        (
-            "the same with the explicit force, max(0, −K φ − B γ*)",
-            _is(
-                "KE⁺ + Φ⁺ of one mass, explicit force [J]",
-                spring_energy_after(implicit=False),
-                "≤",
-                4,
-            ),
-            "M = 1 kg at rest, K = 8 N/m, B = 0, φ = −1 m, h = 1 s: 32 J after the step, 4 J before",
-        ),
-    )
-
-
-def resting_energy() -> tuple[Comparisons, Twins]:
-    return (), resting_contact()[1]
 
 
 def energy_factor(k: int) -> Fraction:
@@ -260,15 +164,17 @@ def exact_instances() -> tuple[Comparisons, Twins]:
 
 
 BY_STATEMENT: dict[str, Callable[[], tuple[Comparisons, Twins]]] = {
-    each.__name__: each
-    for each in (
-        unequal_restitution,
-        erratum_rank,
-        erratum_spreading,
-        erratum_saturation,
-        resting_contact,
-        resting_energy,
-        fp_gram_pinv,
-        exact_instances,
-    )
+    each.__name__: each for each in (erratum_rank, fp_gram_pinv, exact_instances)
 }
+
+
+def comparisons_of(block: layout.Block) -> tuple[Comparisons, Twins]:
+    """Return the comparisons of a statement and the false ones."""
+    if block.name in BY_STATEMENT:
+        return BY_STATEMENT[block.name]()
+    shown = (read_comparison(entry.words, entry.formula) for entry in block.all("numbers"))
+    false = []
+    for entry in block.all("false"):
+        title, _, words = entry.words.partition(" :: ")
+        false.append((title, read_comparison(words, entry.formula), entry.note))
+    return tuple(shown), tuple(false)

@@ -30,9 +30,7 @@ def checked(block: Block) -> ProofRecord:
     statement = Statement(block)
     known = Known([*statement.given, *statement.definitions])
     steps = checked_steps(statement, known)
-    comparisons, false_ones = (
-        numbers.BY_STATEMENT[block.name]() if block.all("numbers") else ((), ())
-    )
+    comparisons, false_ones = numbers.comparisons_of(block)
     needed = tuple(_needed(entry, facts, statement) for entry, facts in statement.hypotheses)
     twins = (
         *(_twin(entry, statement) for entry in block.all("twin")),
@@ -41,9 +39,7 @@ def checked(block: Block) -> ProofRecord:
             for title, claim, note in false_ones
         ),
     )
-    second = by_sympy.refusal(
-        block, [[line.text for line in step.certificate] for step in steps], comparisons
-    )
+    second = by_sympy.refusal(block, [[line.text for line in step.certificate] for step in steps])
     steps += [
         StepRecord(number_line(*each), refusal="" if each.is_true else f"'{each.says}' is false")
         for each in comparisons

@@ -217,7 +217,7 @@ class Reader:
 
     def __init__(self, names: Mapping[str, Expression]) -> None:
         self.names = {"I": ONE, **names}
-        words = "|".join(re.escape(name) for name in sorted(names, key=len, reverse=True))
+        words = "|".join(re.escape(name) for name in sorted(self.names, key=len, reverse=True))
         self._token = re.compile(rf"\s*({words}|\d+(?:/\d+)?|\S)")
 
     def expression(self, text: str) -> Expression:
