@@ -36,6 +36,7 @@ from typing import NamedTuple
 import numpy as np
 
 from reference.complementarity.solution import project_on_cone
+from reference.complementarity.solvers.qp import daqp
 from reference.exact import relative_energy_gain
 from verification.impacts import (
     Floats,
@@ -53,7 +54,7 @@ from verification.laws.equality import (
     elastic_conserves,
     impulse_comes_from_the_contacts,
 )
-from verification.laws.resolver import Resolver, least_push, outcome, own_outcome
+from verification.laws.resolver import Resolver, outcome, own_outcome
 
 TOUCHING = 1e-12  # relative to ‖Aᵢ‖ |u|: a smaller normal velocity counts as zero
 # Laws that call the resolver on variants of an impact.
@@ -67,10 +68,7 @@ OF_VARIANTS = (
     "maximal_dissipation",
 )
 CLEAR = 0.05  # least singular value of one contact's unit rows, for laws that need its impulse
-# searches of a cone by rays and by steps; the distance that ends them
-_REFINEMENTS = 20
-_STEPS = 5000
-NEAR = 1e-8
+NEAR = 1e-8  # distance from a cone that counts as none
 
 UNILATERAL_LAWS: dict[str, Law] = {name: LAWS[name] for name in ("kinetic_energy", "impulse_range")}
 FRICTIONAL_LAWS: dict[str, Law] = UNILATERAL_LAWS | {
@@ -118,83 +116,61 @@ def contacts_only_push(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> 
     return None if np.isnan(distance) else (distance, bounds.restitution)
 
 
+def pushed(rows: Floats, target: Floats) -> Floats:
+    """Return the point Aᵀp (d,) with p ≥ 0 that is closest to the target (d,).
+
+    A contact of its own, along a direction of its own, gives daqp's accuracy the target's scale.
+    """
+    every = np.pad(np.asarray(rows, np.float64), ((0, 1), (0, 1)))
+    every[-1, -1] = 1.0
+    whole = np.append(np.asarray(target, np.float64), np.linalg.norm(target))
+    return np.asarray(rows.T @ daqp(every, -every @ whole)[:-1])
+
+
 def distance_from_cone(case: ImpactCase, target: Floats) -> float:
     """Return the least |Aᵀp − target| over impulses p that push, each inside its friction cone.
 
-    The method is least squares over rays of the cones. With two tangents, each iteration adds two
-    rays per contact: one along the friction found, and one in the direction that reduces the
-    remainder most. It cannot tell rays apart that are close to parallel; accelerated projected
-    gradients (O'Donoghue and Candès 2015) finish the search. Every p found lies inside the cones,
-    so the distance is never too small. It is NEAR or less if the target lies in the cones, and NaN
-    if the search ends before it can tell.
+    Normal impulses alone are tried first, by daqp. Then Clarabel's interior points solve the
+    cone program  min t  with |target − Aᵀp| ≤ t. Its p is moved into the cones, so the distance is
+    never too small. It is NEAR or less if the target lies in the cones, and NaN if the program's
+    dual value does not show that no other p halves it.
     """
+    import clarabel
+    from scipy.sparse import csc_matrix
+
+    nearest = float(np.linalg.norm(target - pushed(case.rows, target)))
+    if nearest <= NEAR:
+        return nearest
+    (c, d) = case.rows.shape
     m = 0 if case.tangents is None else case.tangents.shape[1]
-    # T L⁻ᵀ
-    tangents = case.with_tangents.rows[case.contacts :].reshape(case.contacts, m, case.coordinates)
-    friction = np.zeros(case.contacts) if case.friction is None else case.friction
-    fixed = np.repeat(
-        np.vstack([np.zeros((1, m)), np.eye(m), -np.eye(m)])[None], case.contacts, axis=0
-    )
-    directions = fixed
-    distance = np.inf
-    for _ in range(_REFINEMENTS):  # directions (c, k, m): k rays of each contact
-        rays = case.rows[:, None] + friction[:, None, None] * np.einsum(
-            "ckm,cmd->ckd", directions, tangents
-        )
-        used = directions
-        p = least_push(rays.reshape(-1, case.coordinates), target).reshape(directions.shape[:2])
-        rest = target - np.einsum("ck,ckd->d", p, rays)
-        distance = min(distance, float(np.linalg.norm(rest)))
-        if distance <= NEAR:
-            return distance
-        if (
-            m < 2
-        ):  # the rays are all; least squares end early where a large p along nearly opposed ones is needed
-            break
-        more = np.stack([np.einsum("ck,ckm->cm", p, directions), tangents @ rest], axis=1)
-        size = np.linalg.norm(more, axis=2, keepdims=True)
-        more = np.divide(more, size, out=np.zeros_like(more), where=size > 0.0)
-        directions = np.concatenate([fixed, more], axis=1)
+    friction = np.zeros(c) if case.friction is None else np.asarray(case.friction, np.float64)
+    tangents = case.with_tangents.rows[c:].reshape(c, m, d)
     blocks = np.concatenate([case.rows[:, None], tangents], axis=1)
-    push = np.concatenate(
-        [p.sum(1)[:, None], friction[:, None] * np.einsum("ck,ckm->cm", p, used)], axis=1
-    )
-    return _descend(blocks, friction, target, push)
-
-
-def _descend(blocks: Floats, friction: np.ndarray, target: Floats, p: Floats) -> float:
-    """Return the least |Aᵀp − target| that steps from p (c, 1 + m) find, inside the cones, or NaN.
-
-    With r = target − Aᵀp, no p' has a remainder below (target·r − max over p' of p'·(A r)) / |r|.
-    The search ends when this shows that no p' up to ten times as large as p halves the distance.
-    """
-    size = np.linalg.norm(blocks, axis=(1, 2))[:, None]
-    size[size == 0.0] = 1.0
-    rows = (blocks / size[:, :, None]).reshape(-1, len(target))
-    p = p * size
-    length = 1.0 / max(float(np.linalg.norm(rows, 2)) ** 2, 1.0)
-    moved = p
-    pace = 1.0
-    nearest = np.inf
-    for _ in range(_STEPS):
-        tried = project_on_cone(
-            moved + length * (rows @ (target - moved.ravel() @ rows)).reshape(p.shape), friction
-        )
-        rest = target - tried.ravel() @ rows
-        nearest = min(nearest, float(np.linalg.norm(rest)))
-        gained = (rows @ rest).reshape(p.shape)
-        most = float(
-            np.max(gained[:, 0] + friction * np.linalg.norm(gained[:, 1:], axis=1), initial=0.0)
-        )
-        if nearest <= NEAR or target @ rest - 10.0 * tried[:, 0].sum() * most > 0.5 * rest @ rest:
-            return nearest
-        if np.sum((moved - tried) * (tried - p)) > 0.0:
-            pace = 1.0
-        faster = 0.5 * (1.0 + np.sqrt(1.0 + 4.0 * pace * pace))
-        moved = tried + (pace - 1.0) / faster * (tried - p)
-        p = tried
-        pace = faster
-    return float("nan")
+    size = np.linalg.norm(blocks, axis=(1, 2), keepdims=True)
+    rows = np.divide(blocks, size, out=blocks, where=size > 0.0).reshape(-1, d)
+    unknowns = np.eye(1 + len(rows))  # t, then p
+    impulses = unknowns[1:]
+    normal = impulses[:: 1 + m]
+    within = impulses.copy()
+    within[:: 1 + m] *= friction[:, None]
+    apart = np.vstack([unknowns[:1], -rows.T @ impulses])  # to which the target is added
+    values = [apart, normal]
+    cones = [clarabel.SecondOrderConeT(1 + d), clarabel.NonnegativeConeT(c)]
+    if m:
+        values.append(within)
+        cones += c * [clarabel.SecondOrderConeT(1 + m)]
+    matrix = np.vstack(values)
+    given = np.zeros(len(matrix))
+    given[1 : 1 + d] = target
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-12
+    found = clarabel.DefaultSolver(
+        csc_matrix(unknowns.shape), unknowns[0], csc_matrix(-matrix), given, cones, settings
+    ).solve()
+    p = project_on_cone(np.reshape(found.x[1:], (c, 1 + m)), friction)
+    nearest = min(nearest, float(np.linalg.norm(target - p.ravel() @ rows)))
+    return nearest if nearest <= NEAR or found.obj_val_dual > 0.5 * nearest else np.nan
 
 
 @law(UNILATERAL_LAWS, "no_penetration", "γ⁺ ≥ min(0, −e γ⁻): no contact is left approaching")
@@ -251,8 +227,8 @@ def mixed_impacts_follow_newton_or_poisson(
     u = case.u
     rows = case.unit_rows
     e = case.restitution
-    newton = u + (1.0 + e) * (rows.T @ least_push(rows, -u))
-    poisson = newton + rows.T @ least_push(rows, -newton)
+    newton = u + (1.0 + e) * pushed(rows, -u)
+    poisson = newton + pushed(rows, -newton)
     found = case.lower.T @ own_outcome(resolver, case)
     nearer = min(float(np.linalg.norm(found - answer)) for answer in (newton, poisson))
     return nearer / case.speed, max(bounds.restitution, bounds.comparison(case))

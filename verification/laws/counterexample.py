@@ -76,32 +76,30 @@ def kind_of(fault: str) -> str:
     return " ".join(fault.split()[:2])
 
 
+@dataclass
 class Hunt:
     """The search for an impact that breaks a law, by the same kind of fault as the impact drawn.
 
+    kind : of the fault, see `kind_of`; "" if an answer breaks the law.
     child : makes fresh resolvers, and makes the calls; None if the resolver itself is called.
-    seconds : time of the search; half of it is kept for fresh resolvers.
+    ends : when the time is over; half of it is kept for fresh resolvers.
     tell : called at each try.
     """
 
-    def __init__(
-        self,
-        law: Law,
-        fault: str,
-        bounds: Bounds,
-        resolver: Resolver,
-        child: Child | None,
-        seconds: float,
-        tell: Callable[[], None],
-    ) -> None:
-        self.law = law
-        self.kind = kind_of(fault)
-        self.bounds = bounds
-        self.resolver = child or resolver
-        self.child = child
-        self.ends = time.monotonic() + seconds
-        self.half = self.ends if child is None else self.ends - 0.5 * seconds
-        self.tell = tell
+    law: Law
+    kind: str
+    bounds: Bounds
+    resolver: Resolver
+    child: Child | None
+    ends: float
+    tell: Callable[[], None]
+
+    def __post_init__(self) -> None:
+        if self.child is not None:
+            self.resolver = self.child
+            self.half = 0.5 * (time.monotonic() + self.ends)
+        else:
+            self.half = self.ends
 
     def breaks(
         self, case: ImpactCase, least: float = 0.0, earlier: Sequence[bytes] | None = None

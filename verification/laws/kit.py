@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from importlib.util import find_spec
 from inspect import signature
-from typing import Any, NamedTuple, Self
+from operator import itemgetter
+from typing import Any, Self
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from verification.impacts import (
 )
 from verification.laws.bounds import KIT, Bounds, Law, LawCount
 from verification.laws.child import Child, child_of
-from verification.laws.contracts import CONTRACTS, EXACT_LAWS, OF_VARIANTS, Contract
+from verification.laws.contracts import CONTRACTS, EXACT_LAWS, OF_VARIANTS
 from verification.laws.counterexample import (
     HANGS,
     NOTABLE,
@@ -47,6 +48,34 @@ ITERATED = 1e-4  # largest residual that the accuracy of an iteration may explai
 
 
 @dataclass
+class Breaks:
+    """The impacts that break a law in one way: by an answer, or for want of a usable one.
+
+    Attributes
+    ----------
+    fault : what the resolver did for want of an answer, else "".
+    first, calls : the first of the impacts, and the pickled arguments of the calls until then.
+    drawn : with their residuals, the simplest of them and the one with the largest residual. The
+        simplest has the fewest coordinates and contacts; a residual of NOTABLE or more comes first.
+    """
+
+    fault: str
+    first: ImpactCase
+    calls: list[bytes]
+    drawn: list[tuple[float, ImpactCase]]
+
+    def add(self, value: float, case: ImpactCase) -> None:
+        """Take one more impact with its residual into account."""
+        every = [*self.drawn, (value, case)]
+        self.drawn = [min(every, key=_simplicity), max(every, key=itemgetter(0))]
+
+
+def _simplicity(drawn: tuple[float, ImpactCase]) -> tuple[bool, int]:
+    value, case = drawn
+    return value < NOTABLE, case.coordinates + case.contacts
+
+
+@dataclass
 class LawVerdict(LawCount):
     """Verdict on one law over all impacts.
 
@@ -54,37 +83,32 @@ class LawVerdict(LawCount):
     ----------
     checked, failures : impacts the law applied to, and those that broke it.
     worst : the residual with the largest value / tolerance (None if the law never applied).
-    largest : largest value of the residual, whatever its tolerance.
-    largest_case : the impact that breaks the law with the largest residual; None if no impact
-        breaks it.
-    smallest_case : the impact with the fewest coordinates and contacts that breaks the law; impacts
-        with a residual of 1e-6 or more take precedence.
-    fault : first message if the resolver raised an exception or returned an unusable value.
-    fault_case : the impact of this message; the other cases are those of usable answers.
-    first_calls : by `fault_case` or not, the first impact that broke the law, and the pickled
-        arguments of the calls until then.
+    breaks : the impacts that break the law, by whether a usable answer was missing.
     error : exception that the law itself raised, after which it was not tried again; else None.
     """
 
     statement: str = ""
     worst_case: ImpactCase | None = None
-    largest: float = -np.inf
-    largest_case: ImpactCase | None = None
-    fault: str = ""
+    breaks: dict[bool, Breaks] = field(default_factory=dict, repr=False)
     error: Exception | None = None
-    smallest_case: ImpactCase | None = None
-    fault_case: ImpactCase | None = None
-    first_calls: dict[bool, tuple[ImpactCase, list[bytes]]] = field(
-        default_factory=dict, repr=False
-    )
-    _largest_failure: float = field(default=-np.inf, repr=False)
-    # whether it is below NOTABLE, and its size
-    _smallest: tuple[bool, int] = field(default=(True, 0), repr=False)
 
     @property
     def passed(self) -> bool:
         """Whether no impact broke the law and the law itself raised no exception."""
         return self.failures == 0 and self.error is None
+
+    @property
+    def largest(self) -> float:
+        """Largest residual of an answer that breaks the law, whatever its tolerance; 0 if none
+        does."""
+        return self.breaks[False].drawn[-1][0] if False in self.breaks else 0.0
+
+    @property
+    def fault(self) -> str:
+        """What the law itself raised, or what the resolver did for want of an answer; else ""."""
+        if self.error is not None:
+            return f"the law itself raised {type(self.error).__name__}: {self.error}"
+        return self.breaks[True].fault if True in self.breaks else ""
 
     def __str__(self) -> str:
         mark = "kept  " if self.passed else "BROKEN"
@@ -92,38 +116,28 @@ class LawVerdict(LawCount):
         line = f"  {mark} {self.statement}: {self.failures} of {self.checked} impacts break it, {worst}"
         return f"{line}\n         {self.fault}" if self.fault else line
 
-    def try_on(self, law: Law, case: ImpactCase, resolver: Resolver, bounds: Bounds) -> None:
+    def try_on(self, law: Law, case: ImpactCase, resolver: Watched, bounds: Bounds) -> None:
         """Try the law on one impact; a law that raises an exception is not tried again."""
         if self.error is not None:
             return
         try:
-            residual, complaint = residual_of(law, case, resolver, bounds)
+            residual, fault = residual_of(law, case, resolver, bounds)
         except Exception as error:
             self.error = error
-            self.fault = f"the law itself raised {type(error).__name__}: {error}"
             return
         if residual is None:
             return
         passed = self.add(residual)
         if self.worst is residual:
             self.worst_case = case
-        self.largest = max(self.largest, residual.value)
         if passed:
             return
-        if bool(complaint) not in self.first_calls and isinstance(resolver, Watched):
-            self.first_calls[bool(complaint)] = case, list(resolver.calls)
-        if complaint:
-            if self.fault_case is None:
-                self.fault = complaint
-                self.fault_case = case
-            return
-        if self.largest_case is None or residual.value > self._largest_failure:
-            self._largest_failure = residual.value
-            self.largest_case = case
-        size = residual.value < NOTABLE, case.coordinates + case.contacts
-        if self.smallest_case is None or size < self._smallest:
-            self._smallest = size
-            self.smallest_case = case
+        known = self.breaks.get(bool(fault))
+        if known is None:
+            drawn = [(residual.value, case)]
+            self.breaks[bool(fault)] = Breaks(fault, case, list(resolver.calls), drawn)
+        elif not fault:
+            known.add(residual.value, case)
 
 
 class Report(str):
@@ -232,8 +246,8 @@ class PassivityReport(Report):
     @property
     def hint(self) -> str:
         """What to do if all errors are as small as those of an iteration that ends early."""
-        largest = max((one.largest for one in self.verdicts if not one.passed), default=0.0)
-        if not 0.0 < largest < ITERATED:
+        largest = max(one.largest for one in self.verdicts)
+        if not 0.0 < largest < ITERATED or any(True in one.breaks for one in self.verdicts):
             return ""
         wider = 10.0 ** np.ceil(np.log10(largest))
         table = "KIT" if self.contract == "equality" else "ONE_SIDED"
@@ -375,10 +389,23 @@ def check_passivity(
         if own_process and child is None:
             raise ArgumentError("own_process", True, "False where no process can be forked")
         watched = Watched(child if own_process and child else resolver)
-        trial = _Trial(watched, bounds, terms, int(impacts), seed, condition, chosen, verdicts)
-        done = _try_all(trial, ends, progress)
-        hunts = _Hunts(trial, resolver, child, search, contract, ends, progress)
-        found = tuple(_counterexamples(hunts))
+        trial = _Trial(
+            resolver=resolver,
+            child=child,
+            watched=watched,
+            contract=contract,
+            laws=chosen,
+            verdicts=verdicts,
+            bounds=bounds,
+            impacts=int(impacts),
+            seed=seed,
+            largest_condition=condition,
+            search=search,
+            ends=ends,
+            progress=progress,
+        )
+        done = trial.try_all()
+        found = tuple(trial.counterexamples())
         watched.forget()
     late = "" if done == impacts else f"too slow: {done} of {impacts} impacts in {patience:g} s"
     return PassivityReport(
@@ -461,146 +488,137 @@ def laws_named(known: dict[str, Law], laws: Sequence[str]) -> dict[str, Law]:
     return {name: law for name, law in known.items() if name in names}
 
 
-class _Trial(NamedTuple):
-    """A resolver, the impacts that it gets, the laws that are tried, and their verdicts so far."""
+@dataclass
+class _Trial:
+    """One check: the resolver, the laws that are tried with their verdicts so far, and the search
+    for counterexamples.
 
-    resolver: Watched
+    child : makes fresh resolvers; None where no process can be forked.
+    watched : answers the calls of the laws: the resolver, or its child.
+    """
+
+    resolver: Resolver
+    child: Child | None
+    watched: Watched
+    contract: str
+    laws: dict[str, Law]
+    verdicts: dict[str, LawVerdict]
     bounds: Bounds
-    contract: Contract
     impacts: int
     seed: int
     largest_condition: float
-    laws: dict[str, Law]
-    verdicts: dict[str, LawVerdict]
-
-
-def _try_all(trial: _Trial, ends: float, progress: Callable[[int, int], None] | None) -> int:
-    """Check every impact against its laws; return the number of random impacts tried within the
-    time limit."""
-    watched = trial.resolver
-    rng = np.random.default_rng([trial.seed, 3])
-    for done, case, mixed in _drawn(trial):
-        large = case.coordinates >= LARGE_COORDINATES[0] or case.contacts >= LARGE_CONTACTS[0]
-        for k, name in enumerate(trial.laws):
-            # of the laws that need more than one call, a large impact is checked by one in turn
-            if (
-                large
-                and name.removeprefix("unequal_") not in OF_ONE_CALL
-                and (done // LARGE_EVERY - k) % len(trial.laws)
-            ):
-                continue
-            if time.monotonic() > ends:
-                return max(0, done - 1)
-            own = mixed if name in UNEQUAL_LAWS else case
-            # every second law with variants takes an impact of its own: a band of e, μ or κ is met
-            # several times
-            if name in OF_VARIANTS and (done + k) % 2 and not large:
-                number = int(rng.integers(1 << 30))
-                number += number % LARGE_EVERY == LARGE_EVERY // 2  # no large impact
-                own = replace(
-                    trial.contract.draw(rng, number, trial.largest_condition),
-                    restitution=float(rng.uniform(trial.contract.least_restitution, 1.0)),
-                )
-                for single in OF_ONE_CALL:
-                    if single in trial.laws:
-                        trial.verdicts[single].try_on(
-                            trial.laws[single], own, watched, trial.bounds
-                        )
-            trial.verdicts[name].try_on(trial.laws[name], own, watched, trial.bounds)
-        for suspect, v_plus in watched.suspects:
-            if suspect is not case and suspect is not mixed:  # judged by their own laws
-                _judge_energy(trial, suspect, v_plus)
-        watched.suspects.clear()
-        if progress is not None and done > 0:
-            progress(done, trial.impacts)
-    return trial.impacts
-
-
-def _judge_energy(trial: _Trial, case: ImpactCase, v_plus: Any) -> None:
-    """Check the energy of an answer that another law got for a variant of an impact, without
-    another call."""
-    own = replace(case, family=f"{case.family}, a variant of it that another law tried")
-    own._answers[id(trial.resolver)] = trial.resolver, (v_plus, 0)
-    name = "kinetic_energy" if case.unequal is None else "unequal_kinetic_energy"
-    if name in trial.laws:
-        trial.verdicts[name].try_on(trial.laws[name], own, trial.resolver, trial.bounds)
-
-
-def _drawn(trial: _Trial) -> Iterator[tuple[int, ImpactCase, ImpactCase]]:
-    """Yield (number, impact, variant with unequal restitutions): the contract's fixed impacts have
-    number 0, the random ones count from 1. Without a law of unequal restitution the variant is the
-    impact itself.
-    """
-    unequal = any(name in UNEQUAL_LAWS for name in trial.laws)
-    seed = trial.seed
-    rng, other, adverse = (np.random.default_rng(own) for own in (seed, [seed, 1], [seed, 2]))
-    for case in trial.contract.first(adverse):
-        yield 0, case, with_unequal_restitution(adverse, case) if unequal else case
-    for number in range(trial.impacts):
-        case = trial.contract.draw(rng, number, trial.largest_condition)
-        yield number + 1, case, with_unequal_restitution(other, case) if unequal else case
-
-
-class _Hunts(NamedTuple):
-    """What the searches for counterexamples share."""
-
-    trial: _Trial
-    resolver: Resolver
-    child: Child | None
     search: int
-    contract: str
     ends: float
     progress: Callable[[int, int], None] | None
 
+    def try_law(self, name: str, case: ImpactCase) -> None:
+        """Try a law on an impact, if the law was chosen."""
+        if name in self.laws:
+            self.verdicts[name].try_on(self.laws[name], case, self.watched, self.bounds)
 
-def _counterexamples(hunts: _Hunts) -> Iterator[Counterexample]:
-    """Yield a counterexample to the first law that an answer broke, and one to the first law for
-    which the resolver gave no usable answer."""
-    verdicts = hunts.trial.verdicts.values()
-    for broken in verdicts:
-        if broken.smallest_case is not None and broken.largest_case is not None:
-            drawn = broken.smallest_case, broken.largest_case
-            yield _counterexample(broken, drawn, "", hunts)
-            break
-    for broken in verdicts:
-        if broken.fault_case is not None:
-            yield _counterexample(broken, (broken.fault_case,), broken.fault, hunts)
-            break
+    def try_all(self) -> int:
+        """Check every impact against its laws; return the number of random impacts tried within the
+        time limit."""
+        rng = np.random.default_rng([self.seed, 3])
+        for done, case, mixed in self.drawn():
+            large = case.coordinates >= LARGE_COORDINATES[0] or case.contacts >= LARGE_CONTACTS[0]
+            for k, name in enumerate(self.laws):
+                # of the laws that need more than one call, a large impact is checked by one in turn
+                if (
+                    large
+                    and name.removeprefix("unequal_") not in OF_ONE_CALL
+                    and (done // LARGE_EVERY - k) % len(self.laws)
+                ):
+                    continue
+                if time.monotonic() > self.ends:
+                    return max(0, done - 1)
+                own = mixed if name in UNEQUAL_LAWS else case
+                # every second law with variants takes an impact of its own: a band of e, μ or κ is
+                # met several times
+                if name in OF_VARIANTS and (done + k) % 2 and not large:
+                    own = self.another(rng)
+                    for single in OF_ONE_CALL:
+                        self.try_law(single, own)
+                self.try_law(name, own)
+            for suspect, v_plus in self.watched.suspects:
+                if suspect is not case and suspect is not mixed:  # judged by their own laws
+                    self.judge_energy(suspect, v_plus)
+            self.watched.suspects.clear()
+            if self.progress is not None and done > 0:
+                self.progress(done, self.impacts)
+        return self.impacts
 
+    def another(self, rng: np.random.Generator) -> ImpactCase:
+        """Return one more impact of the contract, not a large one, with any restitution."""
+        terms = CONTRACTS[self.contract]
+        number = int(rng.integers(1 << 30))
+        number += number % LARGE_EVERY == LARGE_EVERY // 2
+        case = terms.draw(rng, number, self.largest_condition)
+        return replace(case, restitution=float(rng.uniform(terms.least_restitution, 1.0)))
 
-def _counterexample(
-    broken: LawVerdict, drawn: tuple[ImpactCase, ...], fault: str, hunts: _Hunts
-) -> Counterexample:
-    """Return the smallest counterexample that hypothesis or the drawn impacts give, shrunk."""
-    if kind_of(fault) == HANGS:
-        return Counterexample(drawn[0], broken.law, fault)
-    began = time.monotonic()
-    seconds = min(SHRINKING, max(LITTLE_TIME, hunts.ends - began))
+    def judge_energy(self, case: ImpactCase, v_plus: Any) -> None:
+        """Check the energy of an answer that another law got for a variant of an impact, without
+        another call."""
+        own = replace(case, family=f"{case.family}, a variant of it that another law tried")
+        own._answers[id(self.watched)] = self.watched, (v_plus, 0)
+        self.try_law("kinetic_energy" if case.unequal is None else "unequal_kinetic_energy", own)
 
-    def tell() -> None:
-        if hunts.progress is not None:
-            spent = min(time.monotonic() - began, seconds)
-            hunts.progress(int(spent), int(seconds))
+    def drawn(self) -> Iterator[tuple[int, ImpactCase, ImpactCase]]:
+        """Yield (number, impact, variant with unequal restitutions): the contract's fixed impacts
+        have number 0, the random ones count from 1. Without a law of unequal restitution the
+        variant is the impact itself.
+        """
+        terms = CONTRACTS[self.contract]
+        unequal = any(name in UNEQUAL_LAWS for name in self.laws)
+        seed = self.seed
+        rng, other, adverse = (np.random.default_rng(own) for own in (seed, [seed, 1], [seed, 2]))
+        for case in terms.first(adverse):
+            yield 0, case, with_unequal_restitution(adverse, case) if unequal else case
+        for number in range(self.impacts):
+            case = terms.draw(rng, number, self.largest_condition)
+            yield number + 1, case, with_unequal_restitution(other, case) if unequal else case
 
-    given = hunts.trial.laws[broken.law], fault, hunts.trial.bounds, hunts.resolver, hunts.child
-    hunt = Hunt(*given, seconds, tell)
-    kind = "unequal" if broken.law in UNEQUAL_LAWS else hunts.contract
+    def counterexamples(self) -> Iterator[Counterexample]:
+        """Yield a counterexample to the first law that an answer broke, and one to the first law
+        for which the resolver gave no usable answer."""
+        for without_answer in (False, True):
+            for law, verdict in self.verdicts.items():
+                if without_answer in verdict.breaks:
+                    yield self.counterexample(law, verdict.breaks[without_answer])
+                    break
 
-    def search(fails: Callable[[ImpactCase], bool]) -> ImpactCase | None:
-        from verification.laws.strategies import search_counterexample  # brings hypothesis
+    def counterexample(self, law: str, breaks: Breaks) -> Counterexample:
+        """Return the smallest counterexample that hypothesis or the drawn impacts give, shrunk."""
+        kind = kind_of(breaks.fault)
+        if kind == HANGS:
+            return Counterexample(breaks.first, law, breaks.fault)
+        began = time.monotonic()
+        seconds = min(SHRINKING, max(LITTLE_TIME, self.ends - began))
 
-        examples = hunts.search
-        seed = hunts.trial.seed
-        return search_counterexample(fails, examples, seed, kind) if examples else None
+        def tell() -> None:
+            if self.progress is not None:
+                spent = min(time.monotonic() - began, seconds)
+                self.progress(int(spent), int(seconds))
 
-    case = hunt.smallest(drawn, search)
-    earlier = tuple[bytes, ...]()
-    later = None if case else hunt.after_calls(*broken.first_calls[bool(fault)])
-    if later is not None:
-        case, earlier = later
-    fresh = None
-    if hunts.child is not None and (case is not None or time.monotonic() < hunt.ends):
-        fresh = case is not None
-    case = drawn[0] if case is None else case
-    calls = hunt.calls_for(case, earlier)
-    return Counterexample(case, broken.law, fault, calls, earlier, fresh)
+        hunt = Hunt(
+            self.laws[law], kind, self.bounds, self.resolver, self.child, began + seconds, tell
+        )
+        impacts = "unequal" if law in UNEQUAL_LAWS else self.contract
+
+        def search(fails: Callable[[ImpactCase], bool]) -> ImpactCase | None:
+            from verification.laws.strategies import search_counterexample  # brings hypothesis
+
+            return search_counterexample(fails, self.search, self.seed, impacts)
+
+        drawn = [case for _, case in breaks.drawn]
+        case = hunt.smallest(drawn, search if self.search else lambda fails: None)
+        earlier = tuple[bytes, ...]()
+        later = None if case else hunt.after_calls(breaks.first, breaks.calls)
+        if later is not None:
+            case, earlier = later
+        fresh = None
+        if self.child is not None and (case is not None or time.monotonic() < hunt.ends):
+            fresh = case is not None
+        case = drawn[0] if case is None else case
+        calls = hunt.calls_for(case, earlier)
+        return Counterexample(case, law, breaks.fault, calls, earlier, fresh)

@@ -13,6 +13,7 @@ import numpy as np
 from iapb.run import Run
 from iapb.system import System
 from verification.impacts import Floats, ImpactCase
+from verification.laws.bounds import LawResidual
 from verification.laws.resolver import (
     RANK_CUT,
     Resolver,
@@ -314,14 +315,12 @@ PLANTED_TRAJECTORY_FAULTS: dict[str, Callable[[SceneCase], Run | None]] = {
 }
 
 
-def first_occasion(law: str, scenes: list[SceneCase]) -> Run | None:
-    """Return the run with the law's fault in the first scene to which the law applies and the fault
-    makes a difference.
-
-    None if there is no such scene.
-    """
+def residual_with_fault(law: str, scenes: list[SceneCase]) -> LawResidual | None:
+    """Return the residual of a law with its fault, in the first scene to which the law applies and
+    in which the fault makes a difference; None if there is no such scene."""
     for case in scenes:
         run = PLANTED_TRAJECTORY_FAULTS[law](case)
-        if run is not None and TRAJECTORY_LAWS[law].check(Trajectory(run)) is not None:
-            return run
+        residual = None if run is None else TRAJECTORY_LAWS[law].check(Trajectory(run))
+        if residual is not None:
+            return residual
     return None

@@ -126,7 +126,6 @@ def _velocity(
 
 # The correct resolver; the planted bugs are made from its parts.
 RANK_CUT = 1e-10
-ROUNDING = 1e-12
 
 
 def whitened(change: Callable[..., Floats]) -> Resolver:
@@ -156,38 +155,3 @@ def sound_resolver(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
     """Return v⁺ from u⁺ = u − (1 + e) Qᵀ Q u, with Q from the singular value decomposition of the
     unit rows of A."""
     return projecting(M, J, v, 1.0 + e)
-
-
-def least_push(rows: Floats, target: Floats) -> Floats:
-    """Return the p ≥ 0 (c,) that brings Aᵀp closest to `target` (d,), by the active sets of Lawson
-    and Hanson (1974).
-
-    A row joins the active set only if it reduces the remainder by more than rounding. scipy 1.17's
-    `nnls` has no such threshold: for a p that is 0 up to 1e-17 it returned impulses of 0.1.
-    """
-    p = np.zeros(len(rows))
-    used = np.zeros(len(rows), dtype=bool)
-    length = np.linalg.norm(rows, axis=1)
-    unit = np.divide(rows, length[:, None], out=np.zeros_like(rows), where=length[:, None] > 0.0)
-    least = ROUNDING * float(np.linalg.norm(target))
-    tried = np.zeros(len(rows), dtype=bool)
-    for _ in range(10 * (1 + len(rows))):
-        slope = np.where(used | tried, -np.inf, unit @ (target - unit.T @ p))
-        if not len(rows) or slope.max() <= least:
-            break
-        joins = int(np.argmax(slope))
-        used[joins] = tried[joins] = True
-        while used.any():
-            best = np.zeros_like(p)
-            best[used] = np.linalg.lstsq(unit[used].T, target, rcond=None)[0]
-            if np.all(best[used] > 0.0):
-                tried[:] = False
-                break
-            leaving = used & (best <= 0.0)
-            stops = leaving & (p > best)
-            share = np.min(p[stops] / (p[stops] - best[stops]), initial=1.0)
-            p += share * (best - p)
-            used &= ~(leaving & (p <= ROUNDING * np.max(p, initial=0.0)))
-            p[~used] = 0.0
-        p = np.where(used, best, 0.0)
-    return np.divide(p, length, out=np.zeros_like(p), where=length > 0.0)

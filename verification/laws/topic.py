@@ -15,7 +15,7 @@ from verification.finding import Part, of_each
 from verification.laws import LAWS, PLANTED_BUGS, check_passivity, engine, planted
 from verification.laws.bounds import LawCount
 from verification.laws.scenes import SceneCase, draw_scene, draw_spatial_scene
-from verification.laws.trajectories import TRAJECTORY_LAWS, Trajectory
+from verification.laws.trajectories import TRAJECTORY_LAWS, judge_run
 from verification.methods import gram_pinv
 from verification.table import HOLDS, Columns, Row, Table
 
@@ -71,34 +71,30 @@ def _engine_law(study: Study, name: str) -> Row:
     return _row(engine.ENGINE_LAWS[name].statement, count, fault.name, broken.failures > 0)
 
 
-def _trajectories(study: Study) -> tuple[list[SceneCase], list[Trajectory], list[Trajectory]]:
-    """The random scenes, their trajectories, and those that stay finite."""
+def _trajectories(study: Study) -> tuple[list[SceneCase], dict[str, LawCount]]:
+    """The random scenes, and the count of each law."""
     rng = np.random.default_rng(SEED)
     scenes = [draw_scene(rng, TRAJECTORY_STEPS) for _ in range(TRAJECTORIES)]
     scenes += [draw_spatial_scene(rng, TRAJECTORY_STEPS) for _ in range(IN_SPACE)]
-    runs = of_each(
+    judged = of_each(
         enumerate(scenes, 1),
-        lambda case: [Trajectory(case[1].simulate())],
+        lambda case: judge_run(case[1].simulate()),
         study.failures,
         lambda case: f"trajectory of random scene {case[0]}",
     )
-    every = list(runs)
-    finite = TRAJECTORY_LAWS["finite"]
-    return scenes, every, [one for one in every if finite.check(one).passed]
+    counts = {name: LawCount(name) for name in TRAJECTORY_LAWS}
+    for name, residual in judged:
+        counts[name].add(residual)
+    return scenes, counts
 
 
 def _trajectory_law(study: Study, name: str) -> Row:
-    scenes, every, whole = study.once("trajectories", lambda: _trajectories(study))
-    law = TRAJECTORY_LAWS[name]
-    count = LawCount(name)
-    for one in every if name == "finite" else whole:
-        if (found := law.check(one)) is not None:
-            count.add(found)
-    run = planted.first_occasion(name, scenes)
-    residual = law.check(Trajectory(run)) if run is not None else None
+    scenes, counts = study.once("trajectories", lambda: _trajectories(study))
+    residual = planted.residual_with_fault(name, scenes)
     caught = residual is not None and not residual.passed
     fault = planted.PLANTED_TRAJECTORY_FAULTS[name].__name__
-    return _row(f"along a trajectory: {law.statement}", count, fault, caught)
+    statement = f"along a trajectory: {TRAJECTORY_LAWS[name].statement}"
+    return _row(statement, counts[name], fault, caught)
 
 
 KINDS: dict[str, Callable[[Study, str], Row]] = {

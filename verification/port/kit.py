@@ -20,7 +20,16 @@ from verification.laws.counterexample import import_line, name_of, residual_of, 
 from verification.laws.kit import PATIENCE, Report, laws_named
 from verification.port.device import BareDevice, Motion, Port, start_of, sums_of
 from verification.port.laws import FORCE_LAWS, Terms, smaller_motions
-from verification.port.search import LONG, SLOWER, Found, Goal, Search, edge_of, one_pass
+from verification.port.search import (
+    LONG,
+    SLOWER,
+    Found,
+    Goal,
+    NoForce,
+    Search,
+    edge_of,
+    one_pass,
+)
 
 MOTIONS = 40  # for the laws other than energy
 SLOW_EFFORT = 0.5  # of a whole search, in that for slow hands
@@ -229,13 +238,13 @@ def check_force(
         if progress is not None:
             progress(done + 1, len(STAGES))
     unfinished = ""
-    if search.fault and "finite" not in chosen:
-        unfinished = f"it gave no force in a motion of the search: {search.fault}"
+    if trial.fault and "finite" not in chosen:
+        unfinished = f"it gave no force in a motion of the search: {trial.fault}"
     if trial.damping == np.inf and "energy" in chosen and trial.verdicts["energy"].passed:
         unfinished = (
             "no damping is enough: a slower or smaller motion than those tried draws energy"
         )
-    if search.late and not search.fault:
+    if search.late and not trial.fault:
         unfinished = f"too slow: the search did not end in {patience:g} s; numbers are lower bounds"
     return ForceReport(
         name_of(law),
@@ -243,8 +252,8 @@ def check_force(
         terms,
         seed,
         tuple(trial.verdicts.values()),
-        np.nan if search.fault else trial.damping,
-        np.nan if search.fault else trial.friction,
+        np.nan if trial.fault else trial.damping,
+        np.nan if trial.fault else trial.friction,
         fastest,
         trial.slow,
         trial.edge,
@@ -270,6 +279,7 @@ class _Trial:
         self.friction = 0.0
         self.slow: float | None = None
         self.edge = np.empty((0, 2))
+        self.fault = ""  # why the law gave no force in the search
 
     def stages(self, fastest: float | None, edge: bool) -> Iterator[None]:
         """Do the stages of the check, one at each step."""
@@ -280,8 +290,19 @@ class _Trial:
             if any(verdict.fault for verdict in self.verdicts.values()):
                 break
         yield
-        if not search.fault:
-            search.look()
+        try:
+            yield from self.searches(fastest, edge)
+        except NoForce as error:
+            self.fault = str(error)
+            self.judge("finite", error.motion)
+            for goal in search.goals:
+                for one in search.ranked(goal)[:1]:
+                    self.judge("energy", one.motion)
+
+    def searches(self, fastest: float | None, edge: bool) -> Iterator[None]:
+        """Do the stages that search; raises NoForce."""
+        search = self.search
+        search.look()
         yield
         damping_goal, friction_goal = search.goals
         most = [self.most(goal) for goal in search.goals]
@@ -290,14 +311,14 @@ class _Trial:
         self.friction = max(self.friction, other.needed)
         if search.unbounded(damping_goal, most[0].motion):
             self.damping = np.inf
-        if self.damping == np.inf and most[0].motion is not None:
+        if self.damping == np.inf:
             slower = [one_pass(most[0].motion, 2**k) for k in range(SLOWER + 1)]
             most += [search.from_rest(friction_goal, one, 0) for one in slower]
             self.friction = max(self.friction, *(one.needed for one in most[1:]))
         for one in most:
             self.judge("energy", one.motion)
-        self.judge("bounded", search.largest.motion)
-        self.judge("finite", search.motion_of_fault)
+        if search.largest is not None:
+            self.judge("bounded", search.largest.motion)
         yield
         if fastest is not None and not search.late:
             effort = SLOW_EFFORT * search.effort
@@ -305,19 +326,10 @@ class _Trial:
                 search, goals=(damping_goal,), fastest=fastest, best={}, planes=[], effort=effort
             )
             self.slow = self.searched(slow).needed
-            self.take_fault(slow)
         yield
         if edge and not search.late:
             self.edge = self.edge_found()
         yield
-
-    def take_fault(self, other: Search) -> None:
-        """Take over what went wrong in a search of its own."""
-        search = self.search
-        if other.fault and not search.fault:
-            search.fault = other.fault
-            search.motion_of_fault = other.motion_of_fault
-            self.judge("finite", other.motion_of_fault)
 
     def most(self, goal: Goal) -> Found:
         """Improve the best motions for a goal; return the best from rest."""
@@ -347,20 +359,13 @@ class _Trial:
         """Search a goal, beginning with known motions."""
         effort = EDGE_EFFORT * self.search.effort
         own = replace(self.search, goals=(goal,), best={}, longest=LONG, effort=effort)
-        for motion in self.known():
+        for motion in self.search.known():
             own.try_on(motion)
-        best = self.searched(own)
-        self.take_fault(own)
-        return best
+        return self.searched(own)
 
-    def known(self) -> list[Motion]:
-        """Return the best motions of all speeds for all goals."""
-        every = [one.motion for own in self.search.best.values() for one in own.values()]
-        return [motion for motion in every if motion is not None]
-
-    def judge(self, name: str, motion: Motion | None) -> None:
-        """Judge a law on a motion, if there is one."""
-        if motion is None or name not in self.laws:
+    def judge(self, name: str, motion: Motion) -> None:
+        """Judge a law on a motion, if the law was chosen."""
+        if name not in self.laws:
             return
         verdict = self.verdicts[name]
         residual, fault = residual_of(self.laws[name], motion, self.search.port, self.terms)
@@ -391,7 +396,7 @@ class _Trial:
 
     def shorter(self, breaks: Callable[[Motion], bool]) -> Iterator[Motion]:
         """Yield a few short motions that draw energy."""
-        for motion in sorted(self.known(), key=_samples):
+        for motion in sorted(self.search.known(), key=_samples):
             longer = (replace(motion, repeats=times * motion.repeats) for times in (1, 8, 64))
             drawing = next(filter(breaks, longer), None)
             if drawing is not None:

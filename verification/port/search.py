@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from iapb.errors import IapbError
 from reference import Floats
 from verification.laws.resolver import ResolverFault
 from verification.port.device import BareDevice, Motion, Port, Sums, sums_of
@@ -58,8 +59,16 @@ class Goal(NamedTuple):
 class Found:
     """A motion and what it needs of a goal."""
 
-    needed: float = -np.inf
-    motion: Motion | None = None
+    needed: float
+    motion: Motion
+
+
+class NoForce(IapbError):
+    """The law gave no usable answer in a motion."""
+
+    def __init__(self, fault: ResolverFault, motion: Motion) -> None:
+        super().__init__(str(fault))
+        self.motion = motion
 
 
 @dataclass
@@ -81,11 +90,9 @@ class Search:
     fastest: float = np.inf
     best: dict[Goal, dict[int, Found]] = field(default_factory=dict)
     planes: list[tuple[float, float, float]] = field(default_factory=list)
-    largest: Found = field(default_factory=Found)  # the largest force [N]
+    largest: Found | None = None  # the largest force [N]
     longest: int = LONGEST
     effort: float = 1.0  # share of the calls
-    fault: str = ""
-    motion_of_fault: Motion | None = None
 
     @property
     def device(self) -> BareDevice:
@@ -94,8 +101,8 @@ class Search:
 
     @property
     def late(self) -> bool:
-        """Whether the time is over, or the law gave no usable answer."""
-        return bool(self.fault) or time.monotonic() > self.ends
+        """Whether the time is over."""
+        return time.monotonic() > self.ends
 
     @property
     def slow(self) -> bool:
@@ -112,25 +119,21 @@ class Search:
         """Most samples in a cycle of the hand."""
         return max(SLOWEST, 8 * self.shortest)
 
-    def forces(self, motion: Motion) -> Floats | None:
-        """Return the forces (n, d) in a motion; None if the law gave no usable answer."""
+    def forces(self, motion: Motion) -> Floats:
+        """Return the forces (n, d) in a motion; raises NoForce."""
         try:
             forces = self.port.forces(motion.positions)
         except ResolverFault as fault:
-            if not self.fault:
-                self.fault = str(fault)
-                self.motion_of_fault = motion
-            return None
+            raise NoForce(fault, motion) from None
         with np.errstate(over="ignore"):
             largest = float(np.linalg.norm(forces, axis=1).max())
-        if largest > self.largest.needed:
+        if self.largest is None or largest > self.largest.needed:
             self.largest = Found(largest, motion)
         return forces
 
-    def sums(self, motion: Motion) -> Sums | None:
-        """Play a motion; None if the law gave no usable answer."""
-        forces = self.forces(motion)
-        return None if forces is None else sums_of(motion.positions, forces, self.device.dt)
+    def sums(self, motion: Motion) -> Sums:
+        """Play a motion; raises NoForce."""
+        return sums_of(motion.positions, self.forces(motion), self.device.dt)
 
     def try_on(self, motion: Motion, *goals: Goal) -> float:
         """Play a motion and keep it where it is the best; return what it needs of the last goal."""
@@ -139,7 +142,7 @@ class Search:
         value = -np.inf
         for goal in goals or self.goals:
             of_goal = self.best.setdefault(goal, {})
-            best = of_goal.get(speed, Found()).needed
+            best = of_goal[speed].needed if speed in of_goal else -np.inf
             value = self.value(goal, motion, sums)
             if value > best and motion.repeats > 1:  # does it go on like that?
                 longer = replace(motion, repeats=LASTS * motion.repeats)
@@ -148,11 +151,9 @@ class Search:
                 of_goal[speed] = Found(value, motion)
         return value
 
-    def value(self, goal: Goal, motion: Motion, sums: Sums | None) -> float:
+    def value(self, goal: Goal, motion: Motion, sums: Sums) -> float:
         """Return what a motion needs from rest, or with `longest` samples more of its last rounds; of
         a slow hand what these rounds need."""
-        if sums is None:
-            return -np.inf
         if self.slow:
             return float(goal.needed(rounds_of(motion, sums))[0])
         whole = float(goal.needed(sums, self.stored).max())
@@ -202,7 +203,7 @@ class Search:
             scan = Motion(self.start, self.start + way[:, None] * line, np.empty((0, size)), 0)
             self.try_on(scan)
             force = self.forces(scan)
-            if force is None or self.late:
+            if self.late:
                 return
             at = scan.positions
             for lag in 2 ** np.arange(int(np.log2(SCAN))):
@@ -233,8 +234,7 @@ class Search:
         rng = self.rng
         reach = self.device.reach
         size = reach * 10.0 ** rng.uniform(-3.5, -0.1)
-        known = [one.motion for found in self.best.values() for one in found.values()]
-        cycles = [motion.cycle for motion in known if motion is not None and len(motion.cycle)]
+        cycles = [motion.cycle for motion in self.known() if len(motion.cycle)]
         near = rng.choice([1.0, 10.0 ** rng.uniform(-4.0, 0.0)])
         middle = near * rng.uniform(-reach, reach, len(self.start))
         if cycles and rng.random() < 0.5:
@@ -295,9 +295,13 @@ class Search:
     def improve(self, goal: Goal) -> None:
         """Improve the best cycles of some speeds for a goal, and then again the best of all."""
         for rank in (0, 1, 2, 0):
-            cyclic = [one for one in self.ranked(goal) if one.motion and len(one.motion.cycle)]
+            cyclic = [one for one in self.ranked(goal) if len(one.motion.cycle)]
             for one in cyclic[rank : rank + 1]:
                 self.climb(goal, self.cornered(goal, one))
+
+    def known(self) -> list[Motion]:
+        """Return the best motions of all speeds for all goals."""
+        return [one.motion for found in self.best.values() for one in found.values()]
 
     def ranked(self, goal: Goal) -> list[Found]:
         """Return the best motions of each speed for a goal, the best first."""
@@ -306,7 +310,7 @@ class Search:
     def cornered(self, goal: Goal, one: Found) -> Found:
         """Halve a pair of points as long as one half needs more: a step of the force is cornered."""
         for _ in range(HALVINGS):
-            if one.motion is None or len(one.motion.cycle) != 2 or self.late:
+            if len(one.motion.cycle) != 2 or self.late:
                 return one
             halves = [self.motion(half) for half in halves_of(one.motion.cycle)]
             values = [self.try_on(half, goal) for half in halves]
@@ -318,8 +322,6 @@ class Search:
 
     def climb(self, goal: Goal, one: Found) -> None:
         """Change a cycle at random, and keep what needs more."""
-        if one.motion is None:
-            return
         best = one.motion
         value = one.needed
         failed = 0
@@ -370,23 +372,22 @@ class Search:
 
         When the time is over, the best one is still played once: what it needs is a lower bound.
         """
-        best = Found(0.0)
+        rest = Motion(self.start, self.start[None], np.empty((0, len(self.start))), 0)
+        best = Found(0.0, rest)
         for one in self.ranked(goal)[:4]:
             for samples in (LONG, self.longest):
-                in_time = best.motion is None or not self.late
+                in_time = best.motion is rest or not self.late
                 if one.needed > 1.002 * best.needed and in_time:
                     tried = self.from_rest(goal, one.motion, round(self.effort * samples))
                     best = max(best, tried, key=lambda own: own.needed)
         return best
 
-    def from_rest(self, goal: Goal, motion: Motion | None, samples: int) -> Found:
+    def from_rest(self, goal: Goal, motion: Motion, samples: int) -> Found:
         """Play a motion from rest for so many samples; return what it needs, and keep its
         half-plane."""
-        if motion is not None and len(motion.cycle):
+        if len(motion.cycle):
             motion = replace(motion, repeats=8 + samples // len(motion.cycle))
-        sums = None if motion is None else self.sums(motion)
-        if motion is None or sums is None:
-            return Found()
+        sums = self.sums(motion)
         if self.slow:
             return Found(self.value(goal, motion, sums), motion)
         needed = goal.needed(sums, self.stored)
@@ -395,11 +396,9 @@ class Search:
         self.planes.append((work, sums.damped[at], sums.rubbed[at]))
         return Found(float(needed[at]), motion)
 
-    def unbounded(self, goal: Goal, motion: Motion | None) -> bool:
+    def unbounded(self, goal: Goal, motion: Motion) -> bool:
         """Whether no damping is enough: a single pass gives as much at each half of its speed, a loop
         needs twice as much, or chatter at each half of its size."""
-        if motion is None:
-            return False
         cycle = motion.cycle
         if self.gives_once(motion):
             return True
@@ -424,8 +423,6 @@ class Search:
         given = list[float]()
         for k in range(SLOWER):
             sums = self.sums(one_pass(motion, 2**k))
-            if sums is None:
-                return False
             given.append(float((sums.work - sums.rounding).max()) - self.stored)
         last = given[-4:]
         return last[0] > 0.0 and all(b > 0.9 * a for a, b in itertools.pairwise(last))
@@ -433,8 +430,7 @@ class Search:
     def settled(self, goal: Goal, cycle: Floats) -> float:
         """Return what the last rounds of a cycle need, whatever came before."""
         motion = self.motion(cycle, 40)
-        sums = self.sums(motion)
-        return -np.inf if sums is None else float(goal.needed(rounds_of(motion, sums))[0])
+        return float(goal.needed(rounds_of(motion, self.sums(motion)))[0])
 
 
 def one_pass(motion: Motion, slower: int) -> Motion:

@@ -29,8 +29,8 @@ def test_every_planted_bug_is_caught_by_its_law(contract: str, name: str) -> Non
 
 
 def test_a_push_along_nearly_opposed_rows_is_no_pull_and_a_pull_is_one() -> None:
-    """Least squares end 2e-7 before the first; a target opposite to every row is at its own
-    distance."""
+    """Non-negative least squares end 2e-7 before the first; a target opposite to every row is at its
+    own distance."""
     rng = np.random.default_rng(98)
     rows = rng.normal(size=(6, 4))
     for i in range(4):

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from verification.laws.planted import PLANTED_TRAJECTORY_FAULTS, first_occasion
+from verification.laws.planted import PLANTED_TRAJECTORY_FAULTS, residual_with_fault
 from verification.laws.scenes import SceneCase, draw_scene, draw_spatial_scene
-from verification.laws.trajectories import TRAJECTORY_LAWS, Trajectory, judge_run
+from verification.laws.trajectories import TRAJECTORY_LAWS, judge_run
 
 STEPS = 200
 
@@ -32,9 +32,7 @@ def test_random_trajectories_keep_every_law(drawn: list[SceneCase]) -> None:
 @pytest.mark.parametrize("law", TRAJECTORY_LAWS)
 def test_the_planted_fault_breaks_its_law(law: str, drawn: list[SceneCase]) -> None:
     assert set(PLANTED_TRAJECTORY_FAULTS) == set(TRAJECTORY_LAWS)
-    run = first_occasion(law, drawn)
-    assert run is not None
-    residual = TRAJECTORY_LAWS[law].check(Trajectory(run))
+    residual = residual_with_fault(law, drawn)
     assert residual is not None and not residual.passed
 
 
