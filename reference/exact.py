@@ -110,8 +110,8 @@ def relative_energy_gain(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: Arr
 
     If KE⁻ = 0, the result is 0 for KE⁺ = 0 and infinity otherwise.
     """
-    mass = _whole_numbers("mass_matrix", mass_matrix)
-    v, v_after = _whole_numbers("velocities", [v_minus, v_plus])
+    mass, _ = whole_numbers("mass_matrix", mass_matrix)
+    (v, v_after), _ = whole_numbers("velocities", [v_minus, v_plus])
     # ½ and both units cancel
     before = v @ mass @ v
     after = v_after @ mass @ v_after
@@ -123,15 +123,17 @@ def relative_energy_gain(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: Arr
         return np.inf
 
 
-def _whole_numbers(name: str, values: Any) -> Any:
-    """Return Python integers of any length whose ratios are those of the values."""
+def whole_numbers(name: str, values: Any) -> tuple[Any, int]:
+    """Return Python integers of any length and one exponent such that values = integers ·
+    2^exponent exactly."""
     given = np.asarray(values, np.float64)
     if not np.isfinite(given).all():
         raise ArgumentError(name, given, "finite numbers")
     mantissas, exponents = np.frexp(given)
     whole = (mantissas * 2.0**53).astype(np.int64)
-    shifts = np.where(whole != 0, exponents - exponents[whole != 0].min(initial=2000), 0)
-    return whole.astype(object) << shifts.astype(object)
+    least = int(exponents[whole != 0].min(initial=2000))
+    shifts = np.where(whole != 0, exponents - least, 0)
+    return whole.astype(object) << shifts.astype(object), least - 53
 
 
 def condition_number(mass_matrix: ArrayLike) -> float:

@@ -12,8 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,23 +22,20 @@ from iapb.contact.laws import ENGINE_LAWS, ImpulseAugmented
 from iapb.errors import ArgumentError, IapbError
 from iapb.mechanics.bodies import real_numbers
 from iapb.numerics.schema import Booleans, Floats, Integers
-from iapb.run import Run, digests
+from iapb.run import ContactTable, ImpactTable, Run, digests
 from iapb.scene.mechanism import mechanism_of, start_of
 from iapb.scene.reading import scene_from_values
 from iapb.system import system_of
-from reference.exact import relative_energy_gain
+from reference.exact import relative_energy_gain, whole_numbers
 
 # M (n or 1, d, d), v⁻, v⁺ (n, d), and M (v⁺ − v⁻) as recorded
 Batch = tuple[Floats, Floats, Floats, Floats | None]
+Table = TypeVar("Table", ContactTable, ImpactTable)
 
 EXPORT_HEAD = "iapb impacts 2"  # first line of a file of exported impacts
 _CHECKED = 100  # integers confirm one in so many of the impacts that the bound decides
 _EPSILON = np.finfo(float).eps
 _BATCH = 4096  # impacts whose mass matrices are in memory at once
-_STEPS = 1 << 16  # steps of a run that are in memory at once
-# bytes of its states, and rows of its contacts, likewise
-_PIECE = 1 << 26
-_ROWS = 1 << 20
 _INDEFINITE = (
     1e-12  # a negative eigenvalue of M beyond this share of the largest one is no rounding
 )
@@ -148,20 +144,10 @@ class Certificate:
 
 def exact_gain(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -> Fraction:
     """KE⁺ − KE⁻ = ½ (v⁺ᵀMv⁺ − v⁻ᵀMv⁻) as a rational number."""
-    (M, unit) = _integers(mass_matrix)
-    (v, speed_unit) = _integers(np.array([v_minus, v_plus], np.float64))
+    M, unit = whole_numbers("mass_matrix", mass_matrix)
+    v, speed_unit = whole_numbers("velocities", [v_minus, v_plus])
     total = v[1] @ M @ v[1] - v[0] @ M @ v[0]
     return Fraction(total) * Fraction(2) ** (unit + 2 * speed_unit - 1)
-
-
-def _integers(values: ArrayLike) -> tuple[NDArray[np.object_], int]:
-    """Return integers of any length and one exponent such that values = integers · 2^exponent
-    exactly."""
-    mantissas, exponents = np.frexp(_finite("velocity or mass_matrix", values))
-    whole = (mantissas * 2.0**53).astype(np.int64)
-    least = int(exponents[whole != 0].min(initial=0))
-    shifts = np.where(whole != 0, exponents - least, 0)
-    return whole.astype(object) << shifts.astype(object), least - 53
 
 
 def _finite(name: str, values: ArrayLike) -> Floats:
@@ -258,96 +244,67 @@ def certify(run: Run) -> Certificate:
     IapbError
         The digest of the recomputed M differs from the recorded one.
     """
-    step = np.asarray(run.impacts.step)
-    if len(step) and not (step.min() >= 0 and step.max() < len(run.impulse)):
-        raise ArgumentError("impacts.step", step.max(), f"steps from 0 to {len(run.impulse) - 1}")
+    record = _record(run)
+    impacts = record.impacts
+    step = impacts.step
+    if len(step) and not (step.min() >= 0 and step.max() < len(record.impulse)):
+        expected = f"steps from 0 to {len(record.impulse) - 1}"
+        raise ArgumentError("impacts.step", step.max(), expected)
     if (np.diff(step) < 0).any():
         raise ArgumentError("impacts.step", step, "steps that never fall")
-    silent = (
-        run.law not in ENGINE_LAWS
-        and not any(  # another world may not record impulses of contacts
-            piece.contacts.impulse.any() for piece in _pieces(run, step)
-        )
-    )
-    residuals: list[tuple[float, float, float]] = []  # total, span and restitution of each piece
-
-    def batches() -> Iterator[Batch]:
-        for piece in _pieces(run, step):
-            residuals.append((_total(piece), *_contacts(piece, silent)))
-            yield from _batches(piece)
-
-    found = _certificate(batches())
-    total, span, restitution = np.fmax.reduce(residuals).tolist()
-    # else some depend on others
-    every_row = bool(np.all(run.impacts.rank[:] >= run.impacts.rows[:]))
+    total = _total(record)
+    span, restitution = _contacts(record)
+    every_row = bool(np.all(impacts.rank >= impacts.rows))  # else some depend on others
     judged = run.law == ImpulseAugmented().name and every_row and not np.isnan(restitution)
     return replace(
-        found, span=span, restitution=restitution, total=total, restitution_judged=judged
+        _certificate(_batches(record)),
+        span=span,
+        restitution=restitution,
+        total=total,
+        restitution_judged=judged,
     )
 
 
-def _pieces(run: Run, step: Integers) -> Iterator[Any]:
-    """Yield what is certified of a run in pieces of limited memory; the arrays of the run may be in
-    a file."""
-    steps = max(min(_STEPS, _PIECE // (24 * max(run.q.shape[1], 1))), 1)
-    first = 0
-    while first == 0 or first < len(run.impulse):
-        offsets = np.asarray(run.contacts.offsets[first : first + steps + 1])
-        # contacts are bounded, too
-        few = max(int(np.searchsorted(offsets, offsets[0] + _ROWS, side="right")) - 1, 1)
-        offsets = offsets[: few + 1]
-        last = first + max(len(offsets) - 1, 1)
-        hits = np.searchsorted(step, (first, first + len(offsets) - 1))
-        contacts = _columns(
-            run.contacts,
-            ("body_a", "body_b", "point", "normal", "impulse"),
-            slice(offsets[0], offsets[-1]),
-        )
-        contacts.offsets = offsets - offsets[0]
-        impacts = _columns(
-            run.impacts,
-            ("q", "v_minus", "v_plus", "impulse", "rows", "scale", "mass_digest"),
-            slice(*hits),
-        )
-        impacts.step = step[slice(*hits)] - first
-        yield SimpleNamespace(
-            law=run.law,
-            law_settings=run.law_settings,
-            scene_resolved=run.scene_resolved,
-            impulse=run.impulse[first:last],
-            before=int(hits[0]),
-            contacts=contacts,
-            impacts=impacts,
-        )
-        first = last
+class _Record(NamedTuple):
+    """What is certified of a run, in memory; the run may be in a file."""
+
+    run: Run
+    impulse: Floats
+    contacts: ContactTable
+    impacts: ImpactTable
 
 
-def _columns(table: Any, names: Sequence[str], rows: slice) -> SimpleNamespace:
-    """Return these rows of the named columns of a table."""
-    return SimpleNamespace(**{name: np.asarray(getattr(table, name)[rows]) for name in names})
+def _record(run: Run) -> _Record:
+    contacts = ("offsets", "body_a", "body_b", "point", "normal", "impulse")
+    impacts = ("step", "q", "v_minus", "v_plus", "impulse", "rows", "rank", "scale", "mass_digest")
+    return _Record(run, run.impulse[:], _read(run.contacts, contacts), _read(run.impacts, impacts))
 
 
-def _total(run: Any) -> float:
-    """Return `Certificate.total` of a piece, whose numbers must be finite."""
-    table = run.impacts
-    contacts = run.contacts
-    sums = -run.impulse
-    size = np.abs(run.impulse)
+def _read(table: Table, names: Sequence[str]) -> Table:
+    """Return a table with these columns in memory."""
+    return replace(table, **{name: getattr(table, name)[:] for name in names})
+
+
+def _total(record: _Record) -> float:
+    """Return `Certificate.total` of a record, whose numbers must be finite."""
+    (_, impulse, contacts, table) = record
+    sums = -impulse
+    size = np.abs(impulse)
     for name in ("q", "v_minus", "v_plus", "impulse", "scale"):
         _finite(f"impacts.{name}", getattr(table, name))
     for name in ("impulse", "normal", "point"):
         _finite(f"contacts.{name}", getattr(contacts, name)[contacts.impulse != 0.0])
-    _finite("impulse", run.impulse)
+    _finite("impulse", impulse)
     np.add.at(sums, table.step, table.impulse)
     np.add.at(size, table.step, np.abs(table.impulse))
     return _largest_share(np.abs(sums).sum(axis=1), size.sum(axis=1))
 
 
-def _batches(run: Any) -> Iterator[Batch]:
+def _batches(record: _Record) -> Iterator[Batch]:
     """Yield M, v⁻, v⁺ and the generalized impulse of the recorded impacts in batches of
     `_BATCH`."""
-    scene = scene_from_values(run.scene_resolved)
-    table = run.impacts
+    scene = scene_from_values(record.run.scene_resolved)
+    table = record.impacts
     mechanism = mechanism_of(scene)
     begin = start_of(scene)[0]
     for start in range(0, len(table.step), _BATCH):
@@ -356,7 +313,7 @@ def _batches(run: Any) -> Iterator[Batch]:
         other = np.flatnonzero(digests(masses) != table.mass_digest[chosen])
         if len(other):
             raise IapbError(
-                f"impact {run.before + start + other[0]}: M computed again from q differs from the "
+                f"impact {start + other[0]}: M computed again from q differs from the "
                 "recorded M; the record was changed, or another version of iapb wrote it"
             )
         yield masses, table.v_minus[chosen], table.v_plus[chosen], table.impulse[chosen]
@@ -364,9 +321,8 @@ def _batches(run: Any) -> Iterator[Batch]:
 
 def exported_run(run: Run) -> Iterator[str]:
     """Yield the impacts of a run as the lines of `exported`."""
-    for piece in _pieces(run, np.asarray(run.impacts.step)):
-        for mass_matrix, v_minus, v_plus, _ in _batches(piece):
-            yield from exported(mass_matrix, v_minus, v_plus)
+    for mass_matrix, v_minus, v_plus, _ in _batches(_record(run)):
+        yield from exported(mass_matrix, v_minus, v_plus)
 
 
 def exported(mass_matrix: ArrayLike, v_minus: ArrayLike, v_plus: ArrayLike) -> Iterator[str]:
@@ -511,7 +467,7 @@ class _Struck(NamedTuple):
     whole: NDArray[np.bool_]
 
 
-def _struck_at_once(impacts: Any, poisson: bool) -> _Struck:
+def _struck_at_once(impacts: ImpactTable, poisson: bool) -> _Struck:
     """Return the steps that are judged; by Poisson's law, those of a single contact."""
     _, first, line = np.unique(impacts.step, return_index=True, return_inverse=True)
     moved = np.bincount(line, (impacts.q != impacts.q[first[line]]).any(axis=1)) > 0.0
@@ -528,27 +484,25 @@ def _struck_at_once(impacts: Any, poisson: bool) -> _Struck:
     return _Struck(steps, chosen[first], chosen[last], whole)
 
 
-def _contacts(run: Any, silent: bool) -> tuple[float, float]:
+def _contacts(record: _Record) -> tuple[float, float]:
     """Return `Certificate.span` and `Certificate.restitution`; NaN for one that the record cannot
     decide."""
-    impacts = run.impacts
+    (run, impulse, table, impacts) = record
     scene = scene_from_values(run.scene_resolved)
     rubbing = run.law_settings.get("friction_in_impacts") and scene.largest_friction > 0
-    if silent or rubbing or scene.contact.self_collision_rows == "per_body":
-        return np.nan, np.nan
-    if not len(impacts.step):
-        return np.nan, np.nan
+    # another world may not record impulses of contacts
+    silent = run.law not in ENGINE_LAWS and not table.impulse.any()
     steps, first, last, whole = _struck_at_once(impacts, scene.contact.forces == "implicit")
-    if not len(steps):
+    per_body = scene.contact.self_collision_rows == "per_body"
+    if silent or rubbing or per_body or not len(steps):
         return np.nan, np.nan
     mechanism = mechanism_of(scene)
     values = system_of(scene).restitutions
     equality = len(values) == 1 and not run.law_settings.get("pushing")
-    table = run.contacts
-    step_of = np.repeat(np.arange(len(run.impulse)), np.diff(table.offsets))
+    step_of = np.repeat(np.arange(len(impulse)), np.diff(table.offsets))
     struck = np.flatnonzero((table.impulse != 0.0) & np.isin(step_of, steps))
-    difference = -run.impulse[steps]
-    size = np.abs(run.impulse[steps])
+    difference = -impulse[steps]
+    size = np.abs(impulse[steps])
     residual = 0.0
     for start in range(0, len(struck), _BATCH):
         m = struck[start : start + _BATCH]

@@ -569,41 +569,27 @@ def _bodies(rng: np.random.Generator, kind: str) -> tuple[Floats, Floats, Floats
     """Return M, rows (c, 1 + m, d) of normals and tangents, and the translations, for one or two
     rigid bodies."""
     inertia = 10.0 ** rng.uniform(-1.0, 0.0, size=6)  # arms are up to 0.7 m
-    if kind == "body in space":
-        count = int(rng.integers(1, 4))
-        frames = in_few_bits(np.linalg.qr(rng.normal(size=(count, 3, 3)))[0])
-        arms = in_few_bits(rng.uniform(-0.5, 0.5, size=(count, 3)))
-        rows = np.array(
-            [[[*n, *np.cross(r, n)] for n in frame] for r, frame in zip(arms, frames, strict=True)]
-        )
-        return np.diag([1.0, 1.0, 1.0, *inertia[:3]]), rows, None
     count = int(rng.integers(1, 4))
+    if kind == "body in space":
+        axes = in_few_bits(np.linalg.qr(rng.normal(size=(count, 3, 3)))[0])
+        arms = in_few_bits(rng.uniform(-0.5, 0.5, size=(count, 3)))
+        return np.diag([1.0, 1.0, 1.0, *inertia[:3]]), _rows_at(axes, arms), None
     angles = rng.uniform(0.0, 2.0 * np.pi, size=count)
-    arms = rng.uniform(-0.5, 0.5, size=(2, count, 2))
-    normals, tangents = (
-        np.column_stack([np.cos(turned), np.sin(turned)])
-        for turned in (angles + 0.5 * np.pi, angles)
-    )
-    one, other = (
-        np.stack([_planar_rows(normals, arm), _planar_rows(tangents, arm)], axis=1) for arm in arms
-    )
-    if kind == "rod in the plane":  # steep friction can jam it
-        return np.diag([1.0, 1.0, 0.1 * inertia[0]]), one, None
-    if kind == "body in the plane":
-        return np.diag([1.0, 1.0, inertia[0]]), one, None
+    turned = angles[:, None] + [0.5 * np.pi, 0.0]  # of normals and tangents
+    axes = np.stack([np.cos(turned), np.sin(turned), 0.0 * turned], axis=2)
+    arms = np.pad(rng.uniform(-0.5, 0.5, size=(2, count, 2)), ((0, 0), (0, 0), (0, 1)))
+    one, other = (_rows_at(axes, arm)[:, :, [0, 1, 5]] for arm in arms)
+    if kind != "two bodies in the plane":  # steep friction can jam a rod
+        turning = inertia[0] * (0.1 if kind == "rod in the plane" else 1.0)
+        return np.diag([1.0, 1.0, turning]), one, None
     heavier = 10.0 ** rng.uniform(-1.0, 1.0)
     mass = np.diag([1.0, 1.0, inertia[0], heavier, heavier, heavier * inertia[1]])
-    return (
-        mass,
-        np.concatenate([one, -other], axis=2),
-        np.array([[1.0, 0, 0, 1, 0, 0], [0, 1.0, 0, 0, 1, 0]]),
-    )
+    return mass, np.concatenate([one, -other], axis=2), np.tile(np.eye(2, 3), 2)
 
 
-def _planar_rows(axes: Floats, arms: Floats) -> Floats:
-    """Return the rows (c, 3) of forces along axes (c, 2) that act at arms (c, 2)."""
-    moments = arms[:, 0] * axes[:, 1] - arms[:, 1] * axes[:, 0]
-    return np.column_stack([axes, moments])
+def _rows_at(axes: Floats, arms: Floats) -> Floats:
+    """Return the rows (c, k, 6) of forces along k axes (c, k, 3) that act at arms (c, 3)."""
+    return np.concatenate([axes, np.cross(arms[:, None], axes)], axis=2)
 
 
 # Impacts for the algebraic claims: mass matrices of given condition, rows of given rank. Rows are
@@ -688,12 +674,8 @@ def timed_problem(contacts: int, coordinates: int, number: int, seed: int = 0) -
     """
     condition, closeness = TIMED_HARDNESS[number]
     e = (0.0, 0.5, 1.0)[(number + number // 3) % 3]
-    return _timed_problem(coordinates, contacts, condition, closeness, e, seed)
-
-
-def _timed_problem(
-    d: int, c: int, condition: float, closeness: float, e: float, seed: int
-) -> ImpactCase:
+    d = coordinates
+    c = contacts
     rng = np.random.default_rng([seed, d, c, int(np.log10(condition)), int(-np.log10(closeness))])
     mass = with_spectrum(rng, condition ** -np.linspace(0.0, 1.0, d))
     name = f"d={d} c={c} κ(M)={condition:.0e} rows {closeness:.0e} apart"

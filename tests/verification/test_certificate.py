@@ -225,13 +225,13 @@ FORGED: dict[str, tuple[Callable[[Run], Run], set[str]]] = {
 }
 
 
-@pytest.mark.parametrize("steps", [1 << 16, 7])
+@pytest.mark.parametrize("batch", [4096, 3])
 @pytest.mark.parametrize("name", FORGED)
 def test_what_is_forged_in_a_record_fails_in_its_residual(
-    cradle: Run, name: str, steps: int, monkeypatch: pytest.MonkeyPatch
+    cradle: Run, name: str, batch: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Also if the record is judged in pieces of a few steps."""
-    monkeypatch.setattr(verification.certificate, "_STEPS", steps)
+    """Also if the impacts are judged in batches of a few."""
+    monkeypatch.setattr(verification.certificate, "_BATCH", batch)
     forge, failing = FORGED[name]
     found = certify(forge(cradle))
     limits = {"gains": 0.0, "momentum": 1e-9, "span": 1e-9, "total": 1e-9, "restitution": 1e-6}
