@@ -86,21 +86,19 @@ def independent_rows(contact_jacobian: ArrayLike) -> tuple[int, ...]:
     return tuple(next(j for j in range(reduced.ncols()) if reduced[i, j] != 0) for i in range(rank))
 
 
-_PRIME = 2**61 - 1  # 2 has the order 61 here, so a power of two costs nothing
+_PRIME = 2**61 - 1
 
 
 def exact_rank(contact_jacobian: ArrayLike) -> int:
     """Return the rank of J (c, d), decided without rounding.
 
-    Doubles are whole numbers times powers of two. The rank of their residues is never above that of
-    J, and below it only if a large prime divides a determinant, which is as good as impossible.
+    Doubles are whole numbers times one power of two. The rank of their residues is never above that
+    of J, and below it only if a large prime divides a determinant, which is as good as impossible.
     """
     jacobian = np.asarray(contact_jacobian, np.float64)
     if 0 in jacobian.shape:
         return 0
-    mantissas, exponents = np.frexp(jacobian)
-    whole = (mantissas * 2.0**53).astype(np.int64).astype(object)
-    residues = (whole << (exponents % 61).astype(object)) % _PRIME
+    residues = whole_numbers("contact_jacobian", jacobian)[0] % _PRIME
     return int(_flint().nmod_mat(*jacobian.shape, residues.ravel().tolist(), _PRIME).rank())
 
 
@@ -132,7 +130,7 @@ def whole_numbers(name: str, values: Any) -> tuple[Any, int]:
     mantissas, exponents = np.frexp(given)
     whole = (mantissas * 2.0**53).astype(np.int64)
     least = int(exponents[whole != 0].min(initial=2000))
-    shifts = np.where(whole != 0, exponents - least, 0)
+    shifts = np.maximum(exponents - least, 0)
     return whole.astype(object) << shifts.astype(object), least - 53
 
 
