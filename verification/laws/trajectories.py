@@ -79,21 +79,17 @@ class Trajectory:
 
     @cached_property
     def masses(self) -> Floats:
-        """M at the beginning of each step, (n, d, d); a constant M is computed once and
-        broadcast."""
-        mechanism = self.system.mechanism
-        q = self.run.q[:-1]
-        if mechanism.has_constant_mass_matrix:
-            one = mechanism.mass_matrix(q[0])
-            return np.asarray(np.broadcast_to(one, (len(q), *one.shape)))
-        return np.asarray(mechanism.mass_matrices(q))
+        """M at each instant, (n + 1, d, d)."""
+        return self._masses_at(self.run.q)
 
     @cached_property
     def struck_masses(self) -> Floats:
         """M at each impact, (k, d, d)."""
-        return np.asarray(
-            self.system.mechanism.mass_matrices_of_run(self.system.start[0], self.run.impacts.q)
-        )
+        return self._masses_at(self.run.impacts.q)
+
+    def _masses_at(self, q: Floats) -> Floats:
+        masses: Floats = self.system.mechanism.mass_matrices_of_run(self.system.start[0], q)
+        return masses
 
     @cached_property
     def cut(self) -> NDArray[np.bool_]:
@@ -107,12 +103,8 @@ class Trajectory:
     @cached_property
     def v_struck(self) -> Floats:
         """Velocity (n, d) after the impulse of each step and before its forces."""
-        v = self.run.v[:-1].copy()
-        impulse = self.run.impulse
-        struck = np.flatnonzero(np.any(impulse, axis=1))
-        if len(struck):
-            v[struck] += np.linalg.solve(self.masses[struck], impulse[struck][:, :, None])[:, :, 0]
-        return v
+        run = self.run
+        return run.v[:-1] + np.linalg.solve(self.masses[:-1], run.impulse[:, :, None])[:, :, 0]
 
     @cached_property
     def bias_and_gravity(self) -> Floats:
@@ -140,11 +132,8 @@ class Trajectory:
     @cached_property
     def displacements(self) -> Floats:
         """Displacement (n, d) of each step."""
-        mechanism = self.system.mechanism
-        q = self.run.q
-        if mechanism.nq == mechanism.nv:
-            return np.asarray(np.diff(q, axis=0))
-        return np.array([mechanism.difference(a, b) for a, b in zip(q[:-1], q[1:], strict=True)])
+        moved: Floats = self.system.mechanism.displacements(self.run.q)
+        return moved
 
 
 def norm(vector: Floats) -> Floats:
@@ -223,7 +212,7 @@ def forces_explain_motion(trajectory: Trajectory) -> Found:
     if not trajectory.is_explained or trajectory.implicit:
         return None
     run = trajectory.run
-    masses = trajectory.masses
+    masses = trajectory.masses[:-1]
     changed = np.einsum("kij,kj->ki", masses, run.v[1:] - trajectory.v_struck)
     forces = (run.hand_force, run.coupling_force, run.penalty_force, run.friction_force)
     pushed = run.dt * (sum(forces) - trajectory.bias_and_gravity)
@@ -241,13 +230,9 @@ def velocity_moves_configuration(trajectory: Trajectory) -> Found:
     if not trajectory.is_explained or trajectory.cut.any():
         return None
     run = trajectory.run
-    mechanism = trajectory.system.mechanism
-    if mechanism.nq == mechanism.nv:
-        moved = run.q[:-1] + run.dt * run.v[1:]
-    else:
-        moved = np.array(
-            [mechanism.integrate(q, v, run.dt) for q, v in zip(run.q[:-1], run.v[1:], strict=True)]
-        )
+    integrate = trajectory.system.mechanism.integrate
+    each = zip(run.q[:-1], run.v[1:], strict=True)
+    moved = np.array([integrate(q, v, run.dt) for q, v in each])
     size = 1.0 + norm(run.q[1:]) + run.dt * norm(run.v[1:])
     return float(np.max(norm(moved - run.q[1:]) / size)), 16.0 * EPS
 
@@ -269,8 +254,7 @@ def ledger_closes(trajectory: Trajectory) -> Found:
         for name in _FORCES
     }
     _, potential = system.mechanism.energies(run.q, run.v, system.gravity)
-    masses = np.concatenate([trajectory.masses, system.mechanism.mass_matrix(run.q[-1])[None]])
-    kinetic = 0.5 * np.einsum("ni,nij,nj->n", run.v, masses, run.v)
+    kinetic = 0.5 * np.einsum("ni,nij,nj->n", run.v, trajectory.masses, run.v)
     size = float(
         np.max(kinetic)
         + np.max(np.abs(potential))
@@ -312,7 +296,7 @@ def _residuals(trajectory: Trajectory) -> tuple[Floats, Floats]:
     ):
         return np.zeros(1), np.zeros(1)
     dv = run.v[1:] - trajectory.v_struck
-    lost = 0.5 * np.einsum("ni,nij,nj->n", dv, trajectory.masses, dv)
+    lost = 0.5 * np.einsum("ni,nij,nj->n", dv, trajectory.masses[:-1], dv)
     constant_weight = np.einsum("nd,nd->n", trajectory.bias_and_gravity, trajectory.displacements)
     return run.energy["integration_residual"], np.cumsum(
         np.diff(run.energy["potential"]) - constant_weight - lost
