@@ -392,26 +392,34 @@ def _refuse_indefinite(masses: Floats, start: int) -> None:
 
 def _certificate(batches: Iterable[Batch]) -> Certificate:
     """Judge impacts in batches of M, v⁻, v⁺ and impulse."""
-    found = Certificate(0, 0, 0, 0, first_gain=-1, largest_gain=0.0, momentum=np.nan)
+    impacts = 0
+    first_gain = -1
+    counterexample = ""
+    momentum = np.nan
+    gains: list[float] = []
+    decided: list[Judged] = []
     for masses, before, after, recorded in batches:
         judged = _judged(masses, before, after)
         for k in np.flatnonzero(judged.gained).tolist():
             one = masses[k % len(masses)], before[k], after[k]
-            largest = max(found.largest_gain, relative_energy_gain(*one))
-            found = replace(found, largest_gain=largest)
-            if found.first_gain < 0:
-                found = replace(found, first_gain=found.impacts + k, counterexample=_shown(*one))
-        found = replace(
-            found,
-            impacts=found.impacts + len(before),
-            gains=found.gains + int(judged.gained.sum()),
-            by_integers=found.by_integers + judged.by_integers,
-            checked=found.checked + judged.checked,
-        )
+            gains.append(relative_energy_gain(*one))
+            if first_gain < 0:
+                first_gain = impacts + k
+                counterexample = _shown(*one)
+        decided.append(judged)
+        impacts += len(before)
         if recorded is not None and len(before):
-            off = _momentum(masses, before, after, recorded)
-            found = replace(found, momentum=float(np.fmax(found.momentum, off)))
-    return found
+            momentum = float(np.fmax(momentum, _momentum(masses, before, after, recorded)))
+    return Certificate(
+        impacts,
+        len(gains),
+        sum(one.by_integers for one in decided),
+        sum(one.checked for one in decided),
+        first_gain,
+        max(gains, default=0.0),
+        momentum,
+        counterexample=counterexample,
+    )
 
 
 def _momentum(masses: Floats, before: Floats, after: Floats, recorded: Floats) -> float:
@@ -497,29 +505,25 @@ def _contacts(record: _Record) -> tuple[float, float]:
     if silent or rubbing or per_body or not len(steps):
         return np.nan, np.nan
     mechanism = mechanism_of(scene)
-    values = system_of(scene).restitutions
-    equality = len(values) == 1 and not run.law_settings.get("pushing")
     step_of = np.repeat(np.arange(len(impulse)), np.diff(table.offsets))
-    struck = np.flatnonzero((table.impulse != 0.0) & np.isin(step_of, steps))
+    m = np.flatnonzero((table.impulse != 0.0) & np.isin(step_of, steps))
+    k = np.searchsorted(steps, step_of[m])
+    rows_a, rows_b = (
+        mechanism.rows_along(impacts.q[first[k]], body[m], table.point[m], table.normal[m])
+        for body in (table.body_a, table.body_b)
+    )
+    rows = rows_a - rows_b  # (11), (12): nᵀ(J_a − J_b)
+    pushed = rows * table.impulse[m][:, None]
     difference = -impulse[steps]
     size = np.abs(impulse[steps])
-    residual = 0.0
-    for start in range(0, len(struck), _BATCH):
-        m = struck[start : start + _BATCH]
-        k = np.searchsorted(steps, step_of[m])
-        rows_a, rows_b = (
-            mechanism.rows_along(impacts.q[first[k]], body[m], table.point[m], table.normal[m])
-            for body in (table.body_a, table.body_b)
-        )
-        rows = rows_a - rows_b  # (11), (12): nᵀ(J_a − J_b)
-        pushed = rows * table.impulse[m][:, None]
-        np.add.at(difference, k, pushed)
-        np.add.at(size, k, np.abs(pushed))
-        if equality:
-            before = rows * impacts.v_minus[first[k]]
-            after = rows * impacts.v_plus[last[k]]
-            off = np.abs(after.sum(axis=1) + float(values[0]) * before.sum(axis=1))
-            felt = np.abs(before).sum(axis=1)
-            residual = max(residual, _largest_share(off[whole[k]], felt[whole[k]]))
+    np.add.at(difference, k, pushed)
+    np.add.at(size, k, np.abs(pushed))
     span = _largest_share(np.abs(difference).sum(axis=1), size.sum(axis=1))
-    return span, residual if equality and whole.any() else np.nan
+    restitutions = system_of(scene).restitutions
+    if len(restitutions) > 1 or run.law_settings.get("pushing") or not whole.any():
+        return span, np.nan
+    before = rows * impacts.v_minus[first[k]]
+    after = rows * impacts.v_plus[last[k]]
+    off = np.abs(after.sum(axis=1) + float(restitutions[0]) * before.sum(axis=1))
+    felt = np.abs(before).sum(axis=1)
+    return span, _largest_share(off[whole[k]], felt[whole[k]])
