@@ -14,10 +14,12 @@ from verification.proofs.show import (
     ProofRecord,
     Refutation,
     StepRecord,
-    case_lines,
-    fact_line,
+    case_line,
+    lines_of,
     number_line,
-    step_lines,
+    plain,
+    products_of,
+    reasons_of,
 )
 from verification.proofs.statement import Statement, Task
 from verification.proofs.steps import Known, Refused, infer, prove
@@ -30,53 +32,50 @@ def checked(block: Block) -> ProofRecord:
     statement = Statement(block)
     known = Known([*statement.given, *statement.definitions])
     steps = checked_steps(statement, known)
+    second = by_sympy.refusal(block, [step.products for step in steps])
     comparisons, false_ones = numbers.comparisons_of(block)
-    needed = tuple(_needed(entry, facts, statement) for entry, facts in statement.hypotheses)
-    twins = (
-        *(_twin(entry, statement) for entry in block.all("twin")),
-        *(
-            Refutation(title, number_line(*claim), (), note, not claim.is_true)
-            for title, claim, note in false_ones
-        ),
-    )
-    second = by_sympy.refusal(block, [[line.text for line in step.certificate] for step in steps])
-    steps += [
-        StepRecord(number_line(*each), refusal="" if each.is_true else f"'{each.says}' is false")
-        for each in comparisons
-    ]
+    for each in comparisons:
+        steps.append(
+            StepRecord(number_line(each), refusal="" if each.is_true else f"'{each.says}' is false")
+        )
+    needed = [_needed(entry, facts, statement) for entry, facts in statement.hypotheses]
+    twins = [_twin(entry, statement) for entry in block.all("twin")]
+    for title, claim, note in false_ones:
+        twins.append(Refutation(title, number_line(claim), "", note, not claim.is_true))
     problems = [f"step refused: {step.refusal}" for step in steps if not step.accepted]
-    problems += [
-        f"not shown: {refutation.title}"
-        for refutation in (*needed, *twins)
-        if not refutation.refuted
-    ]
+    problems += [f"not shown: {each.title}" for each in (*needed, *twins) if not each.refuted]
     problems += [f"SymPy refuses a step: {second}"] if second else []
-    problems += [
-        f"hypothesis never used: {fact.name}"
-        for fact in statement.given
-        if fact.name not in known.used
-    ]
+    unused = [fact.name for fact in statement.given if fact.name not in known.used]
+    problems += [f"hypothesis never used: {name}" for name in unused]
     problems += [] if twins else ["no wrong twin"]
     if statement.given and not _witnessed(statement):
         problems.append("no exact case satisfies the hypotheses and the conclusions")
     (title,), (source,), (says,) = (block.prose(key) for key in ("title", "source", "says"))
+    proof = (line for number, step in enumerate(steps, 1) for line in step.lines(number))
+    sections = {
+        "STATEMENT": (plain(says),),
+        "HYPOTHESES": lines_of(statement.given),
+        "NOTATION": lines_of(statement.definitions),
+        "CONCLUSIONS": lines_of(statement.conclusions),
+        "PROOF": tuple(proof),
+        "EACH HYPOTHESIS IS NEEDED": tuple(line for case in needed for line in case.lines),
+        "FALSE VARIANTS": tuple(line for twin in twins for line in twin.lines),
+        "ASSUMED ABOUT ROUNDING": tuple(map(plain, block.prose("assumed"))),
+        "MEASURED ON THE COMPILED CODE": tuple(map(plain, block.prose("measured"))),
+        "REMARKS": tuple(map(plain, block.prose("remark"))),
+    }
     return ProofRecord(
         name=block.name,
         title=title,
         source=source,
         statement=says,
-        hypotheses=tuple(map(fact_line, statement.given)),
-        definitions=tuple(map(fact_line, statement.definitions)),
         steps=tuple(steps),
-        conclusions=tuple(map(fact_line, statement.conclusions)),
-        needed=needed,
-        twins=twins,
-        remarks=block.prose("remark"),
-        assumed=block.prose("assumed"),
-        measured=block.prose("measured"),
+        needed=tuple(needed),
+        twins=tuple(twins),
         problems=tuple(problems),
-        seconds=time.perf_counter() - started,
         sympy=NO if second else YES,
+        sections=sections,
+        seconds=time.perf_counter() - started,
     )
 
 
@@ -86,7 +85,7 @@ def checked_steps(statement: Statement, known: Known) -> list[StepRecord]:
 
 
 def _checked(task: Task, known: Known) -> StepRecord:
-    claim = fact_line(task.claim)
+    (claim,) = lines_of([task.claim])
     because = task.entry.note
     try:
         step = (
@@ -96,9 +95,9 @@ def _checked(task: Task, known: Known) -> StepRecord:
         )
     except Refused as error:
         return StepRecord(claim, because, refusal=str(error))
-    lines = step_lines(step, known)
+    record = StepRecord(claim, because, products_of(step), reasons_of(step, known))
     known.facts.append(step.claim)
-    return StepRecord(claim, because, lines)
+    return record
 
 
 def _witnessed(statement: Statement) -> bool:
@@ -119,13 +118,8 @@ def _needed(entry: Entry, dropped: list[Fact], statement: Statement) -> Refutati
     false = [fact for fact in statement.conclusions if not holds(fact, case)]
     refuted = bool(entry.case and false) and all_hold(others, case) and not all_hold(dropped, case)
     title = "false without " + " and ".join(f"'{fact.name}'" for fact in dropped)
-    return Refutation(
-        title,
-        fact_line([*false, *statement.conclusions][0]),
-        case_lines(case, statement.names),
-        entry.note,
-        refuted,
-    )
+    claims = lines_of([*false, *statement.conclusions])
+    return Refutation(title, claims[0], case_line(case, statement.names), entry.note, refuted)
 
 
 def _twin(entry: Entry, statement: Statement) -> Refutation:
@@ -139,6 +133,5 @@ def _twin(entry: Entry, statement: Statement) -> Refutation:
         and not holds(claim, case)
         and not by_sympy.holds(statement.block, entry.formula, case)
     )
-    return Refutation(
-        title, fact_line(claim), case_lines(case, statement.names), entry.note, refuted
-    )
+    (line,) = lines_of([claim])
+    return Refutation(title, line, case_line(case, statement.names), entry.note, refuted)

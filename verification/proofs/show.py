@@ -1,13 +1,12 @@
-"""Checked proofs as plain records and as text."""
+"""Checked proofs as plain records, with their text."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from fractions import Fraction
 
-from verification.proofs.cases import Case
+from verification.proofs.cases import Case, Comparison
 from verification.proofs.steps import Known, Step, reasons
 from verification.proofs.words import ANY, ONE, Expression, Fact
 
@@ -17,26 +16,30 @@ NOT_APPLICABLE = "not applicable"
 
 
 @dataclass(frozen=True)
-class Line:
-    """One line of a printed proof: its words and, if there is one, its formula."""
-
-    words: str
-    text: str = ""
-
-
-@dataclass(frozen=True)
 class StepRecord:
-    """A checked step: claim, reason, certificate term by term, and why the check refused it, if it
-    did."""
+    """A checked step: claim, reason, the products of its certificate with a reason for each, and
+    why the check refused it, if it did. An inference has reasons without products."""
 
-    claim: Line
+    claim: str
     because: str = ""
-    certificate: tuple[Line, ...] = ()
+    products: tuple[str, ...] = ()
+    reasons: tuple[str, ...] = ()
     refusal: str = ""
 
     @property
     def accepted(self) -> bool:
         return not self.refusal
+
+    def lines(self, number: int) -> list[str]:
+        """Return what is printed of the step."""
+        refused = "" if self.accepted else f"   REFUSED: {self.refusal}"
+        rows = [f"{number}. {self.claim}{refused}"]
+        rows += [f"     {plain(self.because)}"] if self.because else []
+        if not self.products:
+            return rows + [f"     {reason}" for reason in self.reasons]
+        rows.append("     certificate (the difference of both sides, or the value, is the sum of):")
+        each = zip(self.products, self.reasons, strict=True)
+        return rows + [f"       {product}   [{reason}]" for product, reason in each]
 
 
 @dataclass(frozen=True)
@@ -44,33 +47,38 @@ class Refutation:
     """A false statement, an exact case, and whether the case refutes the statement."""
 
     title: str
-    claim: Line
-    case: tuple[Line, ...]
+    claim: str
+    case: str
     note: str
     refuted: bool
+
+    @property
+    def lines(self) -> list[str]:
+        """What is printed of it."""
+        verdict = "refuted" if self.refuted else "NOT REFUTED"
+        rows = [f"{plain(self.title)}: {verdict}", f"     false claim: {self.claim}"]
+        rows += [f"     exact case:  {self.case}"] if self.case else []
+        return rows + ([f"     {plain(self.note)}"] if self.note else [])
 
 
 @dataclass(frozen=True)
 class ProofRecord:
-    """A proof as plain data, with everything that the command line and the report show."""
+    """A proof as plain data: what the report shows, and its text, readable without the code.
+
+    sympy : whether SymPy accepts the proof, too
+    """
 
     name: str
     title: str
     source: str
     statement: str
-    hypotheses: tuple[Line, ...]
-    definitions: tuple[Line, ...]
     steps: tuple[StepRecord, ...]
-    conclusions: tuple[Line, ...]
     needed: tuple[Refutation, ...]
     twins: tuple[Refutation, ...]
-    remarks: tuple[str, ...]
-    assumed: tuple[str, ...]
-    measured: tuple[str, ...]
     problems: tuple[str, ...]
+    sympy: str
+    sections: dict[str, tuple[str, ...]]
     seconds: float = field(compare=False)
-    # whether SymPy accepts the proof too: YES, NO, or why there is no answer
-    sympy: str = NOT_APPLICABLE
 
     @property
     def holds(self) -> bool:
@@ -81,35 +89,15 @@ class ProofRecord:
         return "proved" if self.holds else "not proved"
 
     def as_text(self) -> str:
-        """Return the whole proof as plain text, readable without the code."""
+        """Return the whole proof as plain text."""
         lines = [
             f"{self.title}   [{self.name}]",
             self.source,
             f"verdict: {self.verdict}   ({1e3 * self.seconds:.0f} ms)",
             *(f"  open: {problem}" for problem in self.problems),
-            "",
-            "STATEMENT",
-            f"  {plain(self.statement)}",
         ]
-        for title, rows in (
-            ("HYPOTHESES", map(_formula, self.hypotheses)),
-            ("NOTATION", map(_formula, self.definitions)),
-            ("CONCLUSIONS", map(_formula, self.conclusions)),
-            (
-                "PROOF",
-                (row for number, step in enumerate(self.steps, 1) for row in _step(number, step)),
-            ),
-            (
-                "EACH HYPOTHESIS IS NEEDED",
-                (row for case in self.needed for row in _refutation(case)),
-            ),
-            ("FALSE VARIANTS", (row for twin in self.twins for row in _refutation(twin))),
-            ("ASSUMED ABOUT ROUNDING", map(plain, self.assumed)),
-            ("MEASURED ON THE COMPILED CODE", map(plain, self.measured)),
-            ("REMARKS", map(plain, self.remarks)),
-        ):
-            body = [f"  {row}" for row in rows]
-            lines += ["", title, *body] if body else []
+        for title, rows in self.sections.items():
+            lines += ["", title, *(f"  {row}" for row in rows)] if rows else []
         return "\n".join(lines) + "\n"
 
 
@@ -169,38 +157,35 @@ def plain(prose: str) -> str:
     return re.sub(r"\\?[\${}]", "", prose)
 
 
-def fact_line(fact: Fact) -> Line:
-    """Return a fact as a line: its name in words and its formula."""
-    return Line(f"{fact.name} (entry by entry)" if fact.entrywise else fact.name, str(fact))
+def lines_of(facts: Iterable[Fact]) -> tuple[str, ...]:
+    """Return each fact as a line: its name in words and its formula."""
+    return tuple(f"{fact.name}{' (entry by entry)' * fact.entrywise}:   {fact}" for fact in facts)
 
 
-def number_line(says: str, left: Fraction, relation: str, right: Fraction) -> Line:
+def number_line(compared: Comparison) -> str:
     """Return a comparison of two rationals as a line; a long rational is written as its decimal
     value."""
-    both = [str(each).replace("-", "−") for each in (left, right)]
-    first, second = (
-        each
-        if len(each) <= _LONG
-        else f"{float(value):.6g} (exact rational of {len(each)} characters)"
-        for each, value in zip(both, (left, right), strict=True)
-    )
-    return Line(says, f"{first} {relation} {second}")
+    sides = []
+    for value in (compared.left, compared.right):
+        exact = str(value).replace("-", "−")
+        long = f"{float(value):.6g} (exact rational of {len(exact)} characters)"
+        sides.append(exact if len(exact) <= _LONG else long)
+    return f"{compared.says}:   {f' {compared.relation} '.join(sides)}"
 
 
-def step_lines(step: Step, known: Known) -> tuple[Line, ...]:
-    """Return the certificate of a step, term by term, with the facts that make a term non-negative
-    or zero."""
+def reasons_of(step: Step, known: Known) -> tuple[str, ...]:
+    """Return why each product of a certificate is not negative or zero, or from which facts an
+    inference follows."""
     if step.sources:
-        return (Line("from " + " and ".join(f"'{fact.name}'" for fact in step.sources)),)
-    reasoned = []
+        return ("from " + " and ".join(f"'{fact.name}'" for fact in step.sources),)
+    found = []
     for factors in step.terms:
         names = " and ".join(f"'{fact.name}'" for fact in reasons(factors, known))
-        reasoned.append(f"non-negative by {names}" if names else "a square")
-    reasoned += [f"by '{fact.name}'" for _, fact, _ in step.cofactors]
-    return tuple(map(Line, reasoned, products_of(step)))
+        found.append(f"non-negative by {names}" if names else "a square")
+    return (*found, *(f"by '{fact.name}'" for _, fact, _ in step.cofactors))
 
 
-def products_of(step: Step) -> list[str]:
+def products_of(step: Step) -> tuple[str, ...]:
     """Return the products of a certificate as text: the terms, then the cofactors."""
     found = [[_bracketed(factor) for factor in factors] for factors in step.terms]
     for left, fact, right in step.cofactors:
@@ -212,7 +197,7 @@ def products_of(step: Step) -> list[str]:
                 *[_bracketed(right)] * (right != ONE),
             ]
         )
-    return [" · ".join(factors) for factors in found]
+    return tuple(" · ".join(factors) for factors in found)
 
 
 def _bracketed(value: Expression | str) -> str:
@@ -221,42 +206,10 @@ def _bracketed(value: Expression | str) -> str:
     return f"({formula})" if formula[0] == "−" or " + " in formula or " − " in formula else formula
 
 
-def case_lines(case: Case, names: Mapping[str, Expression]) -> tuple[Line, ...]:
-    """Return an exact case as one line per letter."""
-    rows = {
-        name: "; ".join(" ".join(map(str, row)) for row in value.tolist())
-        for name, value in case.items()
-    }
-    return tuple(
-        Line("", f"{name} = {row if names[name].rows == ANY else f'[{row}]'}")
-        for name, row in rows.items()
-    )
-
-
-def _formula(line: Line) -> str:
-    return f"{line.words}:   {line.text}" if line.text else line.words
-
-
-def _step(number: int, step: StepRecord) -> list[str]:
-    rows = [
-        f"{number}. {_formula(step.claim)}"
-        + ("" if step.accepted else "   REFUSED: " + step.refusal)
-    ]
-    rows += [f"     {plain(step.because)}"] if step.because else []
-    if any(line.text for line in step.certificate):
-        rows.append("     certificate (the difference of both sides, or the value, is the sum of):")
-    return rows + [
-        f"       {line.text}   [{line.words}]" if line.text else f"     {line.words}"
-        for line in step.certificate
-    ]
-
-
-def _refutation(refutation: Refutation) -> list[str]:
-    verdict = "refuted" if refutation.refuted else "NOT REFUTED"
-    rows = [
-        f"{plain(refutation.title)}: {verdict}",
-        f"     false claim: {_formula(refutation.claim)}",
-    ]
-    case = ",  ".join(line.text for line in refutation.case)
-    rows += [f"     exact case:  {case}"] if case else []
-    return rows + ([f"     {plain(refutation.note)}"] if refutation.note else [])
+def case_line(case: Case, names: Mapping[str, Expression]) -> str:
+    """Return an exact case as a line with the value of each letter."""
+    values = []
+    for name, value in case.items():
+        rows = "; ".join(" ".join(map(str, row)) for row in value.tolist())
+        values.append(f"{name} = {rows if names[name].rows == ANY else f'[{rows}]'}")
+    return ",  ".join(values)
