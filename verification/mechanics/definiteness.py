@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from reference import Floats
 from reference.random_mechanisms import random_mechanism, random_state
 from verification.check import Check, Study, no_row_fails
 from verification.table import Row
@@ -17,16 +16,6 @@ LARGEST_CONDITION = 1e12
 SEED = 20050603
 
 
-def _scaled(mass: Floats) -> Floats:
-    """M scaled to a unit diagonal, which removes the units of the coordinates."""
-    scale = 1.0 / np.sqrt(np.diag(mass))
-    return mass * np.outer(scale, scale)
-
-
-def _condition(mass: Floats) -> float:
-    return float(np.linalg.cond(_scaled(mass))) if np.all(np.diag(mass) > 0.0) else np.inf
-
-
 def _definite(study: Study, joints: int) -> Row:
     count = MATRICES[study.depth]
     rng = np.random.default_rng([SEED, joints, 1])
@@ -35,10 +24,14 @@ def _definite(study: Study, joints: int) -> Row:
     for _ in range(count):
         mechanism = random_mechanism(rng, joints)
         mass = mechanism.mass_matrix(random_state(rng, mechanism)[0])
-        condition = _condition(mass) if mechanism.nv else np.inf
+        scale = np.sqrt(np.diag(mass))  # removes the units of the coordinates
+        if not len(mass) or not np.all(scale > 0.0):
+            continue
+        values = np.linalg.eigvalsh(mass / np.outer(scale, scale))
+        condition = float(np.abs(values).max() / np.abs(values).min())
         if condition <= LARGEST_CONDITION:
             conditions.append(condition)
-            least.append(float(np.linalg.eigvalsh(_scaled(mass))[0]) * condition)
+            least.append(float(values[0]) * condition)
     return {
         "joints": joints,
         "mass matrices": count,
