@@ -8,9 +8,8 @@ scene consists of the plain values of a scene file, so that it can be stored, sh
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -33,9 +32,6 @@ SPATIAL_CELLS = tuple(
 )
 MIDDLE_CHAIN = 0.45  # share of scenes with a linkage, hung in the middle of the room
 STACK = 0.4  # share of scenes with a box on the floor and a smaller box or a ball on it
-# Up to four points of a face share an impact, and a hit on a corner turns its box: K is limited as
-# for a lighter mass.
-SOFTER = 6.0
 
 
 @dataclass(frozen=True)
@@ -55,72 +51,94 @@ class SceneCase:
         return run_world(self.scene(), self.world, self.rendering, partial=True)
 
 
+class _Space(NamedTuple):
+    """What differs between scenes in the plane and in space.
+
+    rates : samples per second that are drawn; field : of gravity [m/s²], in a share of the scenes
+    softer : the stiffness is limited as for a mass that is so many times lighter
+    scale, limits : of the hand's force and torque, and the limits of its device
+    through : the draws from [0, 1) for which the hand has a device
+    """
+
+    head: Values
+    rates: tuple[int, ...]
+    field: list[float]
+    share: float
+    softer: float
+    scale: list[float]
+    limits: list[float]
+    through: tuple[float, float]
+
+
+PLANE = _Space(
+    head={"name": "random_scene"},
+    rates=(256, 512, 1000, 2000),
+    field=[0.0, -9.81],
+    share=0.5,
+    softer=1.0,
+    scale=[2.0, 2.0, 0.05],
+    limits=[15.0, 15.0, 1.0],
+    through=(0.3, 1.0),
+)
+SPACE = _Space(
+    head={"name": "random_scene_in_space", "dimensions": 3},
+    rates=(512, 1000, 2000),
+    field=[0.0, 0.0, -9.81],
+    share=0.6,
+    softer=6.0,  # up to four points of a face share an impact, and a hit on a corner turns its box
+    scale=[2.0] * 3 + [0.05] * 3,
+    limits=[15.0] * 3 + [1.0] * 3,
+    through=(0.0, 0.7),
+)
+
+
 def draw_scene(rng: np.random.Generator, steps: int = 400) -> SceneCase:
     """Return a random planar scene of `steps` steps, with its world and rendering."""
     bodies = _bodies(rng)
-    return _drawn(
-        rng,
-        steps,
-        {"name": "random_scene"},
-        (256, 512, 1000, 2000),
-        bodies,
-        _walls,
-        (0.5, [0.0, -9.81]),
-        min(body["mass"] for body in bodies),
-        ([2.0, 2.0, 0.05], [15.0, 15.0, 1.0], (0.3, 1.0)),
-    )
+    return _drawn(rng, steps, PLANE, bodies, _sides(2, "half_plane"))
 
 
 def draw_spatial_scene(rng: np.random.Generator, steps: int = 400) -> SceneCase:
     """Return a random spatial scene of `steps` steps, with its world and rendering."""
     bodies = _spatial_bodies(rng)
-    return _drawn(
-        rng,
-        steps,
-        {"name": "random_scene_in_space", "dimensions": 3},
-        (512, 1000, 2000),
-        bodies,
-        _room,
-        (0.6, [0.0, 0.0, -9.81]),
-        min(body["mass"] for body in bodies) / SOFTER,
-        ([2.0] * 3 + [0.05] * 3, [15.0] * 3 + [1.0] * 3, (0.0, 0.7)),
-    )
+    return _drawn(rng, steps, SPACE, bodies, _sides(3, "half_space"))
 
 
 def _drawn(
-    rng: np.random.Generator,
-    steps: int,
-    head: Values,
-    rates: Sequence[int],
-    bodies: list[Values],
-    walls: Callable[[np.random.Generator], list[Values]],
-    gravity: tuple[float, list[float]],
-    least_mass: float,
-    hand: tuple[list[float], list[float], tuple[float, float]],
+    rng: np.random.Generator, steps: int, space: _Space, bodies: list[Values], walls: list[Values]
 ) -> SceneCase:
-    """Return a scene of these bodies and draw the rest.
-
-    gravity : share of the scenes that have gravity, and its field [m/s²]
-    hand : scale of its force and torque, the limits of its device, and the draws from [0, 1) for
-        which it has a device
-    """
-    values: Values = {
-        **head,
-        "rate": float(rng.choice(rates)),
-        "bodies": bodies,
-        "walls": walls(rng),
-    }
-    values["duration"] = steps / values["rate"]
+    """Return a scene of these bodies and walls, and draw the rest."""
+    rate = float(rng.choice(space.rates))
+    if space is PLANE and rng.random() < 0.4:
+        place = [round(rng.uniform(-0.4, 0.4), 3), 0.44]
+        walls.append({"name": "post", "kind": "circle", "radius": 0.03, "center": place})
+    values: Values = space.head | {"rate": rate, "bodies": bodies, "walls": walls}
+    values["duration"] = steps / rate
     values["integrator"] = "semi_implicit_euler"
-    if rng.random() < gravity[0]:
-        values["gravity"] = gravity[1]
-    values["contact"] = _contact(rng, least_mass, 1.0 / values["rate"])
+    if rng.random() < space.share:
+        values["gravity"] = space.field
+    lightest = min(body["mass"] for body in bodies) / space.softer
+    values["contact"] = _contact(rng, lightest, 1.0 / rate)
     held = rng.random() < 0.4
     if held:
-        _add_hand(rng, values, *hand)
+        _add_hand(rng, values, space)
     impulses = rng.random() < 0.8
     rendering = str(rng.choice(RENDERINGS)) if held and impulses else "full"
     return SceneCase(values, "IAPB" if impulses else "PB", rendering)
+
+
+def _sides(dimensions: int, kind: str) -> list[Values]:
+    """Return the planes around the room."""
+    sides = [sign * axis for axis in np.eye(dimensions) for sign in (1.0, -1.0)]
+    return [
+        {
+            "name": f"side_{k}",
+            "kind": kind,
+            "point": (ROOM * side).tolist(),
+            "normal": (-side).tolist(),
+        }
+        for k, side in enumerate(sides)
+    ]
 
 
 def _bodies(rng: np.random.Generator) -> list[Values]:
@@ -190,23 +208,6 @@ def _joint(rng: np.random.Generator, in_space: bool, ball: bool) -> Values:
     }
 
 
-def _walls(rng: np.random.Generator) -> list[Values]:
-    sides = ((ROOM, 0.0), (-ROOM, 0.0), (0.0, ROOM), (0.0, -ROOM))
-    walls: list[Values] = [
-        {
-            "name": f"side_{k}",
-            "kind": "half_plane",
-            "point": [x, y],
-            "normal": [-x / ROOM, -y / ROOM],
-        }
-        for k, (x, y) in enumerate(sides)
-    ]
-    if rng.random() < 0.4:
-        place = [round(rng.uniform(-0.4, 0.4), 3), 0.44]
-        walls.append({"name": "post", "kind": "circle", "radius": 0.03, "center": place})
-    return walls
-
-
 def _contact(rng: np.random.Generator, least_mass: float, dt: float) -> Values:
     """Draw contact constants for the lightest body's mass [kg] and a step [s]."""
     stiffness = min(10.0 ** rng.uniform(2.0, 5.0), (STIFFEST / dt) ** 2 * least_mass)
@@ -233,23 +234,18 @@ def _contact(rng: np.random.Generator, least_mass: float, dt: float) -> Values:
     return contact
 
 
-def _add_hand(
-    rng: np.random.Generator,
-    values: Values,
-    scale: list[float],
-    limits: list[float],
-    through: tuple[float, float],
-) -> None:
+def _add_hand(rng: np.random.Generator, values: Values, space: _Space) -> None:
     """Add a hand on the first free body, usually through a device, perhaps with limits, delay and
     quantised sensors."""
+    limits = space.limits
     values["hand"] = {
         "body": "body_0",
-        "force": [round(float(x), 3) for x in rng.normal(scale=scale)],
+        "force": [round(float(x), 3) for x in rng.normal(scale=space.scale)],
     }
-    if not through[0] <= rng.random() < through[1]:
+    if not space.through[0] <= rng.random() < space.through[1]:
         return
     body = values["bodies"][0]
-    turning = np.ravel(values["bodies"][0]["inertia"])
+    turning = np.ravel(body["inertia"])
     inertia = np.array([body["mass"]] * (len(limits) - len(turning)) + turning.tolist())
     rate = 0.05 * values["rate"]  # of the coupling [1/s]: slow beside the step
     values["couplings"] = {
@@ -266,19 +262,6 @@ def _add_hand(
     if rng.random() < 0.3:
         device["position_resolution"] = [1e-5 if limit > 1.0 else 1e-4 for limit in limits]
     values["device"] = device
-
-
-def _room(_: np.random.Generator) -> list[Values]:
-    sides = [sign * ROOM * axis for axis in np.eye(3) for sign in (1.0, -1.0)]
-    return [
-        {
-            "name": f"side_{k}",
-            "kind": "half_space",
-            "point": side.tolist(),
-            "normal": (-side / ROOM).tolist(),
-        }
-        for k, side in enumerate(sides)
-    ]
 
 
 def _spatial_bodies(rng: np.random.Generator) -> list[Values]:
