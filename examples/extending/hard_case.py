@@ -1,8 +1,7 @@
 """A hard case: a bead that touches two facing walls at once. Its exact answer is computed in
 rationals.
 
-In the project it is a function of verification/hard_cases, and one line of `HARD_CASES` in
-catalogue.py; or plain numbers in impacts.yaml.
+In the project it is an entry of verification/hard_cases/impacts.yaml.
 
 Prints:
     factored stable

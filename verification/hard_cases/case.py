@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -146,21 +146,19 @@ class FrictionalCase(HardCase):
         return impact.velocity(impact.passive_share()), 1
 
 
-@dataclass(frozen=True)
-class Measured:
+class Measured(NamedTuple):
     """The quantities of a run that a trajectory case measures.
 
     Attributes
     ----------
-    energy_gain, energy_bound : see `largest_gain`.
-    error : relative distance of the run from the law; error_bound : error that the time step may
-        cause.
+    error : relative distance of the run from the law; error_allowed : what the time step may cause
+    gain : of energy, relative; None: `largest_gain` of the run
     """
 
-    energy_gain: float
-    energy_bound: float
     error: float
-    error_bound: float
+    error_allowed: float
+    gain: float | None = None
+    gain_allowed: float = NO_GAIN
 
 
 @dataclass(frozen=True)
@@ -183,7 +181,7 @@ class TrajectoryCase:
     law: str
     scene: Scene
     measure: Callable[[Run], Measured]
-    worlds: tuple[str, ...] = ("IAPB", "PB", "ideal")
+    worlds: tuple[str, ...]
 
 
 AnyCase = HardCase | TrajectoryCase

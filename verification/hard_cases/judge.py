@@ -39,6 +39,7 @@ from verification.hard_cases.case import (
     FrictionalCase,
     HardCase,
     TrajectoryCase,
+    largest_gain,
     smallest_fault,
 )
 from verification.impacts import EPS
@@ -116,16 +117,15 @@ def _judge_motion(case: TrajectoryCase, world: str, simulate: Simulate) -> Row:
     found = case.measure(run)
     residual = restitution_residual(run)
     restored = not residual > RESTITUTION_TOLERANCE  # NaN: the run has no collision to judge
-    verdict = _verdict(
-        found.energy_gain <= found.energy_bound, restored, found.error <= found.error_bound
-    )
+    gain = largest_gain(run) if found.gain is None else found.gain
+    verdict = _verdict(gain <= found.gain_allowed, restored, found.error <= found.error_allowed)
 
     def is_seen(size: float) -> bool:  # a planted fault does not change the energies
         moved = case.measure(faulty_motion(run, size))
-        return not moved.error <= moved.error_bound
+        return not moved.error <= moved.error_allowed
 
     fault = smallest_fault(is_seen) if verdict == STABLE else math.nan
-    numbers = found.energy_gain, found.energy_bound, residual, found.error, found.error_bound, fault
+    numbers = gain, found.gain_allowed, residual, found.error, found.error_allowed, fault
     return _row(world, verdict, numbers, int(run.impacts.rank.max(initial=0)))
 
 
