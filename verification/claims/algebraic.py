@@ -51,8 +51,22 @@ class Measure(NamedTuple):
     integers only, and no error is allowed.
     """
 
-    errors: Callable[[Batch], Sequence[float] | Floats]
+    errors: Callable[[Batch], Sequence[float]]
     bound: Callable[[Batch], float] | None = None
+
+
+def each(
+    error: Callable[[ImpactCase, Any], float], bound: Callable[[Batch], float] | None = None
+) -> Measure:
+    """Return the part whose error is that of each impact by itself, at the restitution of the
+    batch: a double, or a fraction if no error is allowed."""
+    number = float if bound else Fraction
+
+    def errors(batch: Batch) -> list[float]:
+        e = number(batch.restitution)
+        return [error(case, e) for case in batch.impacts]
+
+    return Measure(errors, bound)
 
 
 def batches(
@@ -146,27 +160,19 @@ def kinetic_energy(mass_matrix: Floats, velocity: Floats) -> float:
     return 0.5 * float(velocity @ mass_matrix @ velocity)
 
 
-def energy_gains(batch: Batch) -> Floats:
-    """Relative energy gain of each impact, in whole numbers."""
-    return np.array(
-        [
-            relative_energy_gain(
-                case.mass_matrix,
-                case.velocity,
-                resolve_impact(*case.arrays, batch.restitution).velocity,
-            )
-            for case in batch.impacts
-        ]
-    )
+def energy_gain(case: ImpactCase, e: float) -> float:
+    """Relative energy gain of an impact, in whole numbers."""
+    after = resolve_impact(*case.arrays, e).velocity
+    return relative_energy_gain(case.mass_matrix, case.velocity, after)
 
 
-def _exact_changes(batch: Batch) -> list[float]:
-    """Return the change of energy of each impact in rational arithmetic [J]."""
-    found = (exact_impact(*case.arrays, Fraction(batch.restitution)) for case in batch.impacts)
-    return [float(impact.energy_after - impact.energy_before) for impact in found]
+def exact_change(case: ImpactCase, e: Fraction) -> float:
+    """Return the change of energy of an impact in rational arithmetic [J]."""
+    impact = exact_impact(*case.arrays, e)
+    return float(impact.energy_after - impact.energy_before)
 
 
-NEVER_GAINS = Measure(_exact_changes)  # the theorem: no rounding
+NEVER_GAINS = each(exact_change)  # the theorem: no rounding
 
 
 # C01, C02: the energy lost against the quadratic form of (18) and (24)
@@ -191,11 +197,11 @@ def losses(
         restitutions=(0.0, 0.5, 0.9, 1.0),
         impacts=impacts,
         parts={
-            PASSIVE: Measure(energy_gains, energy_bound),
-            WITH_HALF: Measure(partial(_misfits, factor=0.5), solve_bound),
-            AS_PRINTED: Measure(partial(_misfits, factor=1.0), solve_bound),
+            PASSIVE: each(energy_gain, energy_bound),
+            WITH_HALF: each(partial(_misfit, factor=0.5), solve_bound),
+            AS_PRINTED: each(partial(_misfit, factor=1.0), solve_bound),
             EXACTLY_PASSIVE: NEVER_GAINS,
-            EXACT_LOSS: Measure(_exact_misfits),
+            EXACT_LOSS: each(_exact_misfit),
         },
         exact=([family for family in families if family.condition_number == first], (0.5,)),
         roles={AS_PRINTED: MISPRINT, PASSIVE: proof},
@@ -223,16 +229,12 @@ def _halved(family: Family, count: int, seed: int) -> Iterator[ImpactCase]:
         yield replace(case, velocity=rest + taken * np.sqrt(share)) if share > 1e-9 else case
 
 
-def _misfits(batch: Batch, factor: float) -> Floats:
+def _misfit(case: ImpactCase, e: float, factor: float) -> float:
     """|loss − factor (1 − e²) vᵀJᵀW†Jv|, relative to this form, which is twice the energy of
     `_taken`."""
-    forms = [
-        kinetic_energy(case.mass_matrix, _taken(case))
-        / kinetic_energy(case.mass_matrix, case.velocity)
-        for case in batch.impacts
-    ]
-    loss = energy_gains(batch) / (2.0 * np.array(forms))
-    return np.asarray(np.abs(loss + factor * (1.0 - batch.restitution**2)))
+    mass = case.mass_matrix
+    form = 2.0 * kinetic_energy(mass, _taken(case)) / kinetic_energy(mass, case.velocity)
+    return abs(energy_gain(case, e) / form + factor * (1.0 - e**2))
 
 
 def _taken(case: ImpactCase) -> Floats:
@@ -246,10 +248,6 @@ def _delassus(case: ImpactCase) -> Floats:
     """Return the Delassus matrix of the independent rows."""
     rows = case.contact_jacobian[: case.rank]
     return np.asarray(rows @ np.linalg.solve(case.mass_matrix, rows.T))
-
-
-def _exact_misfits(batch: Batch) -> list[float]:
-    return [_exact_misfit(case, Fraction(batch.restitution)) for case in batch.impacts]
 
 
 def _exact_misfit(case: ImpactCase, e: Fraction) -> float:
@@ -296,9 +294,8 @@ def _rows_apart(method: Callable[[Floats, Floats, Floats, float], Floats]) -> Me
 
     def distance(case: ImpactCase, e: float) -> float:
         (mass, rows, velocity) = case.arrays
-        rank = case.rank
         everything = method(mass, rows, velocity, e)
-        chosen = gram_cholesky(mass, rows[:rank], velocity, e)
+        chosen = gram_cholesky(mass, rows[: case.rank], velocity, e)
         return float(
             np.sqrt(kinetic_energy(mass, everything - chosen) / kinetic_energy(mass, velocity))
         )
@@ -310,19 +307,17 @@ def _rows_apart(method: Callable[[Floats, Floats, Floats, float], Floats]) -> Me
         )
         return float(100.0 * batch.family.coordinates * EPS * condition)
 
-    return Measure(
-        lambda batch: [distance(case, batch.restitution) for case in batch.impacts], bound
-    )
+    return each(distance, bound)
 
 
 def _differing(velocities: Callable[[ImpactCase, Fraction], tuple[Any, Any]]) -> Measure:
     """1 for each impact in which two velocities in rational arithmetic are not identical."""
 
-    def differ(batch: Batch) -> list[float]:
-        pairs = (velocities(case, Fraction(batch.restitution)) for case in batch.impacts)
-        return [float(tuple(one) != tuple(other)) for one, other in pairs]
+    def differs(case: ImpactCase, e: Fraction) -> float:
+        one, other = velocities(case, e)
+        return float(tuple(one) != tuple(other))
 
-    return Measure(differ)
+    return each(differs)
 
 
 def _by_pseudo_inverse(case: ImpactCase, e: Fraction) -> tuple[Any, Any]:
@@ -377,8 +372,8 @@ C04 = batches(
     impacts={"quick": 12, "full": 200},
     exact=(_ELASTIC[::3], (1.0,)),
     parts={
-        "in doubles": Measure(lambda batch: np.abs(energy_gains(batch)), solve_bound),
-        "in rationals": Measure(lambda batch: np.abs(_exact_changes(batch))),
+        "in doubles": each(lambda case, e: abs(energy_gain(case, e)), solve_bound),
+        "in rationals": each(lambda case, e: abs(exact_change(case, e))),
     },
 )
 
@@ -391,14 +386,12 @@ def _from_lcp(solver: str) -> Measure:
     contact."""
 
     def difference(case: ImpactCase, e: float) -> float:
-        ours = resolve_impact(*case.arrays, e).impulses
-        theirs = newton_lcp(ImpactProblem.from_impact(*case.arrays, e), solver).impulse
+        given = (*approaching(case).arrays, e)
+        ours = resolve_impact(*given).impulses
+        theirs = newton_lcp(ImpactProblem.from_impact(*given), solver).impulse
         return float(np.abs(ours - theirs)[0] / np.abs(theirs)[0])
 
-    return Measure(
-        lambda batch: [difference(approaching(case), batch.restitution) for case in batch.impacts],
-        solve_bound,
-    )
+    return each(difference, solve_bound)
 
 
 C05 = batches(
@@ -508,7 +501,7 @@ _PASSIVE = batches(
     impacts={"quick": 8, "full": 150},
     exact=([Family(*size, 1e2) for size in _SIZES], _RESTITUTIONS),
     parts={
-        RANDOM: Measure(energy_gains, energy_bound),
+        RANDOM: each(energy_gain, energy_bound),
         EXACT: NEVER_GAINS,
     },
     roles={RANDOM: "theorem_2"} | {parts[0]: "scaled_impulse" for parts in RENDERED.values()},
