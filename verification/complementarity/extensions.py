@@ -67,11 +67,11 @@ def _gain(impact: ImpactCase, v_plus: Floats) -> float:
     return (_form(impact, v_plus) - before) / before
 
 
-def with_friction(study: Study, case: tuple[float, float], seed: int = 44) -> Row:
+def with_friction(study: Study, case: tuple[float, float]) -> Row:
     """Compare the engine's frictional impact with Coulomb's NCP and CCP on random impacts with one
     e and one μ."""
     (e, mu) = case
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(44)
     drawn = [draw(rng, approaching=True) for _ in range(COUNTS[study.depth])]
     impacts = [replace(one, restitution=e, friction=np.full(one.contacts, mu)) for one in drawn]
     pushing = same = reduced = unsolved = 0
@@ -149,10 +149,10 @@ FRICTION = Check(
 )
 
 
-def with_unequal(study: Study, signs: str, seed: int = 45) -> Row:
+def with_unequal(study: Study, signs: str) -> Row:
     """Compare the engine's law for unequal restitution with Poisson, the Newton LCP and plain
     equalities."""
-    rng = np.random.default_rng([seed, len(signs)])
+    rng = np.random.default_rng([45, len(signs)])
     count = UNEQUAL_COUNTS[study.depth]
     distances = []
     gains = np.zeros((count, 3))

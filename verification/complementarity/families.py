@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from reference import Floats
 from verification.impacts import ImpactCase
@@ -50,14 +51,24 @@ def two_contacts(cosine: float, speed_ratio: float, rng: np.random.Generator) ->
     The contacts approach at speeds 1 and `speed_ratio`. The lengths of the rows, the mass matrix
     and the velocity components orthogonal to both rows are random.
     """
-    frame = np.linalg.qr(rng.normal(size=(_COORDINATES, _COORDINATES)))[0]
-    rows = np.array([[1.0, 0.0], [cosine, np.sqrt(1.0 - cosine**2)]]) @ frame[:2]
-    closing = np.linalg.solve(rows @ frame[:2].T, [-1.0, -speed_ratio])
-    u = frame.T @ np.concatenate([closing, rng.normal(size=_COORDINATES - 2)])
-    lower = np.linalg.cholesky(random_mass_matrix(rng, _COORDINATES))
+    gram = np.array([[1.0, cosine], [cosine, 1.0]])
+    mass, rows, velocity = _of_gram(rng, _COORDINATES, gram, [1.0, speed_ratio])
     lengths = np.exp(rng.normal(size=(2, 1)))
-    velocity = np.linalg.solve(lower.T, u)
-    return ImpactCase(lower @ lower.T, lengths * (rows @ lower.T), velocity, 0.0, "two contacts")
+    return ImpactCase(mass, lengths * rows, velocity, 0.0, "two contacts")
+
+
+def _of_gram(
+    rng: np.random.Generator, coordinates: int, gram: Floats, speeds: ArrayLike
+) -> tuple[Floats, Floats, Floats]:
+    """Return M, rows with these scalar products in the kinetic metric, and v at which they approach
+    at these speeds; all else is random."""
+    c = len(gram)
+    frame = np.linalg.qr(rng.normal(size=(coordinates, coordinates)))[0]
+    shape = np.linalg.cholesky(gram)
+    along = np.linalg.solve(shape, -np.asarray(speeds))
+    u = frame.T @ np.concatenate([along, rng.normal(size=coordinates - c)])
+    lower = np.linalg.cholesky(random_mass_matrix(rng, coordinates))
+    return lower @ lower.T, shape @ frame[:c] @ lower.T, np.linalg.solve(lower.T, u)
 
 
 def random_mass_matrix(rng: np.random.Generator, coordinates: int) -> Floats:
@@ -94,12 +105,7 @@ def _obtuse(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Floats, 
     d = int(rng.integers(3, 9))
     c = int(rng.integers(2, 4))
     gram = np.eye(c) - rng.uniform(0.0, 0.9 / (c - 1), size=(c, c)) * (1.0 - np.eye(c))
-    frame = np.linalg.qr(rng.normal(size=(d, d)))[0]
-    rows = np.linalg.cholesky(np.minimum(gram, gram.T)) @ frame[:c]
-    lower = np.linalg.cholesky(random_mass_matrix(rng, d))
-    closing = np.linalg.solve(rows @ frame[:c].T, -rng.uniform(0.05, 1.0, c))
-    u = frame.T @ np.concatenate([closing, rng.normal(size=d - c)])
-    return lower @ lower.T, rows @ lower.T, np.linalg.solve(lower.T, u)
+    return _of_gram(rng, d, np.minimum(gram, gram.T), rng.uniform(0.05, 1.0, c))
 
 
 def _face_on_floor(rng: np.random.Generator, redundancy: int) -> tuple[Floats, Floats, Floats]:

@@ -51,13 +51,8 @@ def pile(contacts: int, rng: np.random.Generator) -> ImpactCase:
     """Return an impact of a stack of planar boxes with two contacts between neighbours, all
     approaching."""
     boxes = (contacts + 1) // 2
-    rows = np.zeros((contacts, 3 * boxes))
-    for i in range(contacts):
-        box = i // 2
-        arm = 1.0 if i % 2 else -1.0
-        rows[i, 3 * box + 1 : 3 * box + 3] = 1.0, arm
-        if box > 0:
-            rows[i, 3 * box - 2 : 3 * box] = -1.0, -arm
+    below = np.eye(boxes) - np.eye(boxes, k=-1)
+    rows = np.kron(below, [[0.0, 1.0, -1.0], [0.0, 1.0, 1.0]])[:contacts]
     velocity = np.zeros(3 * boxes)
     velocity[1::3] = -np.cumsum(rng.uniform(0.5, 1.0, boxes))
     velocity[2::3] = rng.uniform(-0.1, 0.1, boxes)
