@@ -3,39 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 
 from verification.check import Topic
-from verification.complementarity.agreement import MAP, SCENE, TWO_CONTACTS
+from verification.complementarity.agreement import MAP, TWO_CONTACTS
 from verification.complementarity.convergence import CONVERGENCE
 from verification.complementarity.extensions import FRICTION, UNEQUAL
-from verification.complementarity.landings import LANDINGS, PEG
+from verification.complementarity.landings import LANDINGS
 from verification.complementarity.piles import PILES
 from verification.complementarity.solvers import SOLVER_TABLE, collections
 from verification.mechanics.against_pinocchio import AGAINST_PINOCCHIO, IMPULSE_DYNAMICS
 from verification.mechanics.definiteness import POSITIVE_DEFINITE
-from verification.numbers import Values
-from verification.table import Table
+from verification.numbers import quoted, read_quotes
 
-
-def _numbers(tables: Mapping[str, Table]) -> Values:
-    """Return what the page quotes."""
-    found = tables[MAP.key]
-    grid = tables[TWO_CONTACTS.key]
-    landings = tables[LANDINGS.key]
-    scenes = found.where(kind=SCENE)
-    piles = tables[PILES.key]
-    return {
-        "impacts": sum(found["cases"]),
-        "contradictions": sum(found["contradictions"]),
-        "points": len(grid.rows),
-        "points_as_predicted": sum(grid.decided),
-        "peg_c": landings.where(impact=PEG)["c"][0],
-        "scene_impacts": sum(scenes["cases"]),
-        "scene_impacts_that_pull": sum(scenes["differ"]),
-        "pile_limit": max(piles["most contacts that agree"]),
-        "pushing_from_the_lcp": max(piles["pushing only, from the LCP"]),
-    }
+QUOTES = Path(__file__).with_name("numbers.yaml")
 
 
 def complementarity(folders: Mapping[str, Path]) -> Topic:
@@ -58,7 +40,7 @@ def complementarity(folders: Mapping[str, Path]) -> Topic:
             POSITIVE_DEFINITE,
             *collections(folders),
         ),
-        numbers=_numbers,
+        numbers=partial(quoted, read_quotes(QUOTES)),
     )
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -30,6 +31,7 @@ from reference.worlds import World, find_world
 from verification.clock import LEAST_ROUNDS, Times, take_turns
 from verification.cost.steps import RecordedLoop
 from verification.finding import Failure, attempt, counted
+from verification.numbers import quoted, read_quotes
 from verification.table import Columns, Row, Table, table_from
 
 ROUNDS = 9  # number of rounds; each loop runs once per round
@@ -183,6 +185,7 @@ def _farthest(one: Floats, other: Floats) -> float | None:
 
 
 STEPS = "time of a step"
+QUOTES = Path(__file__).with_name("numbers.yaml")
 UNMOVED = 1e-6  # [mm] rounding of positions, where another order of sums is chosen
 TIMED = ("step", "all on", "saved", "saved, lower", "saved, upper", "noise", "clear")
 
@@ -233,16 +236,11 @@ def steps_table(rows: Iterable[Row]) -> Table:
 def numbers_of(times: Table) -> Row:
     """Return the main numbers of the page: effects that are on, and the time that the others
     save."""
+    found = quoted(read_quotes(QUOTES), {STEPS: times})
     return {
-        "scenes": len(times.rows),
-        "effects_on": sum(times["effects on"]),
-        "effects": sum(times["effects"]),
-        "saved_median": 0.01 * float(np.median(times["saved"])),
-        "noise_median": 0.01 * float(np.median(times["noise"])),
-        "clear_savings": sum(times["clear"]),
-        "apart_largest_mm": max(times["apart with all on"]),
-        "saves": bool(np.median(times["saved"]) > np.median(times["noise"])),
-        "alone": bool(max(times["apart with all on"]) <= UNMOVED),
+        **found,
+        "saves": found["saved_median"] > found["noise_median"],
+        "alone": found["apart_largest_mm"] <= UNMOVED,
     }
 
 

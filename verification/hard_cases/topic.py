@@ -4,6 +4,7 @@ scenes."""
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,8 +15,8 @@ from verification.finding import Part
 from verification.hard_cases.case import NOT_TRIED, STABLE, AnyCase, TrajectoryCase
 from verification.hard_cases.catalogue import HARD_CASES
 from verification.hard_cases.judge import judge_hard_case, methods_for
-from verification.numbers import Values
-from verification.ordinary.judge import ORDINARY, OURS, THEIRS
+from verification.numbers import Values, quoted, read_quotes
+from verification.ordinary.judge import ORDINARY, THEIRS
 from verification.ordinary.touch import TOUCH
 from verification.table import Columns, Row, Table
 
@@ -23,7 +24,7 @@ ENGINE = ("factored", "IAPB")  # the engine's default impact method and its worl
 IMPACT = "impact"
 MOTION = "motion"
 INSTANTS = 600  # of a failing motion
-SHOWN_STEP = 1.0  # [ms] at which the page quotes the errors of the motions with touches
+QUOTES = Path(__file__).with_name("numbers.yaml")
 
 
 def _case(study: Study, name: str) -> AnyCase:
@@ -139,7 +140,6 @@ FAILURE = Check(
 def _numbers(tables: Mapping[str, Table]) -> Values:
     """Return what the page quotes."""
     every = tables[EVERY_METHOD.key]
-    ordinary = tables[ORDINARY.key]
     rows = every.records()
     wrong = failing(every)
     others = {row["case"] for row in rows if row["method"] not in ENGINE and is_right(row) is False}
@@ -153,10 +153,8 @@ def _numbers(tables: Mapping[str, Table]) -> Values:
         "failing_case": wrong[0] if wrong else None,
         "other_fails": len(others),
         **_failure_numbers(tables[FAILURE.key]),
-        "ordinary": len(ordinary.rows),
-        "ordinary_right": sum(ordinary[f"{OURS} is right"]),
-        "mujoco_right": _right_in_mujoco(ordinary),
-        **_touch_numbers(tables[TOUCH.key]),
+        "mujoco_right": _right_in_mujoco(tables[ORDINARY.key]),
+        **quoted(read_quotes(QUOTES), tables),
     }
 
 
@@ -182,15 +180,6 @@ def _failure_numbers(table: Table) -> Values:
         if arrival and world in largest
         else None
         for world, name in (("IAPB", "iapb"), ("PB", "pb"))
-    }
-
-
-def _touch_numbers(table: Table) -> Values:
-    """Return the largest errors of the motions with touches at SHOWN_STEP, for both rules."""
-    shown = table.where(**{"step": SHOWN_STEP})
-    return {
-        "touch_error": max(shown["error, impacts at the touch"]),
-        "step_error": max(shown["error, impacts at the step"]),
     }
 
 
