@@ -17,9 +17,10 @@ from verification.claims.speed import C19, C22
 from verification.cost import growth, impact_times, robots, steps
 from verification.cost.accuracy import LEMKE
 from verification.cost.calls import PRINTED
-from verification.cost.trajectories import MOTIONS, OURS, WORTH, aims
+from verification.cost.trajectories import MOTIONS, WORTH, aims
+from verification.data import data_of
 from verification.finding import NOT_COMPUTED, REPRODUCED, Finding, Part
-from verification.numbers import Values
+from verification.numbers import Values, quoted
 from verification.table import Columns, Row, Table
 
 STEP = "One step at rest"
@@ -27,6 +28,7 @@ IMPACT = "One impact"
 ROBOT = "Dynamics of a robot"
 CALLED = ", called from Python"
 BY_LEMKE = "Lemke, compiled"
+QUOTES = data_of(__file__, "haptic_rate.yaml")
 
 
 def ratios(study: Study) -> Iterator[Row]:
@@ -154,32 +156,21 @@ def no_targets(_: Table) -> Sequence[Part]:
     return ()
 
 
-def quoted(tables: Mapping[str, Table]) -> Values:
+def _times(tables: Mapping[str, Table]) -> Values:
     """Return the numbers that the page on speed quotes; all of them depend on times."""
     parts = [part for check in BENCH.checks for part in check.judge(tables[check.key])]
-    (tenfold,) = tables[WORTH.key].where(method=OURS[0])["tenfold accuracy costs"]
     scenes = list(aims(tables[MOTIONS.key]))
     behind = [row["scene"] for row in scenes if row["error"] > 1.0]
-    lemke = tables[RATIOS.key].where(against=BY_LEMKE)
-    rigid = tables[C22.key].where(impacts=impact_times.STEPS)
     return {
         "targets": len(parts),
         "targets_met": sum(part.verdict == REPRODUCED for part in parts),
-        "tenfold_costs": tenfold,
         "motions": len(scenes),
         "motions_most_exact": len(scenes) - len(behind),
         "motions_behind": ", ".join(behind),
         "motions_behind_error": max((row["error"] for row in scenes), default=None),
-        "lemke_sizes": sum(lemke["cases"]),
-        "lemke_faster_sizes": sum(lemke["slower"]),
-        "rigid_scenes": len(rigid.rows),
-        "rigid_scenes_that_tell": len(rigid.decided),
-        "rigid_scenes_dearer": sum(rigid.decided),
-        "rigid_step_median_us": float(np.median(rigid["time"])),
-        "rigid_solver_median_us": float(np.median(rigid["solver alone"])),
-        "iapb_step_median_us": float(np.median(rigid["IAPB"])),
         "most_contacts_iapb_12": growth.most_contacts(tables[C19.key], growth.FACTORED, 12),
         "most_contacts_printed_12": growth.most_contacts(tables[C19.key], PRINTED, 12),
+        **quoted(QUOTES, tables),
     }
 
 
@@ -216,7 +207,7 @@ BENCH = Topic(
         RATIOS,
     ),
     numbers=lambda _: {},
-    times=quoted,
+    times=_times,
 )
 # What a report takes from the claims, and what follows from it.
 CLAIMED = (C19.key, C22.key)

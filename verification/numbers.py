@@ -9,12 +9,10 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from ruamel.yaml import YAML
 
 from verification.table import Columns, Table, titled
 
@@ -43,14 +41,8 @@ LIMITS = {
 }
 
 
-def read_quotes(path: Path) -> dict[str, dict[str, Any]]:
-    """Return the quotes of a file by table and name; a quote is the arguments of `quote`."""
-    found: dict[str, dict[str, Any]] = YAML(typ="safe").load(path)
-    return found
-
-
 def quoted(quotes: Mapping[str, Mapping[str, Any]], tables: Mapping[str, Table]) -> Values:
-    """Return the numbers of quotes, by name."""
+    """Return the numbers of quotes by table and name; a quote is the arguments of `quote`."""
     return {
         name: quote(tables[key], **given)
         for key, named in quotes.items()

@@ -9,20 +9,20 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
 from math import degrees, isfinite
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from verification.claims import peg, walls
 from verification.claims.conditions import TILTS, Condition
+from verification.data import data_of
 from verification.finding import DECIDING, REFUTED, WHERE, Failure, Finding, attempt
-from verification.numbers import Values, quoted, read_quotes, value_tables
+from verification.numbers import Values, quoted, value_tables
 from verification.table import Table, table_from
 
 MILLI = 1e3
 LEFT_OPEN = "left open"  # name of the table
-QUOTES = read_quotes(Path(__file__).with_suffix(".yaml"))  # by claim
+QUOTES = data_of(__file__, "numbers.yaml")  # by claim
 Claims = Mapping[str, Finding]
 
 

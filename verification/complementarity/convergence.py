@@ -25,6 +25,7 @@ from reference.scene_events import SceneTruth, scene_truth
 from reference.time_stepping import RigidConstraints
 from reference.worlds import find_world
 from verification.check import Check, no_row_fails
+from verification.data import data_of
 from verification.table import HOLDS
 
 TRUTH_SCENES = {
@@ -45,55 +46,16 @@ _ROUNDING = 1e-7  # per second of step: smaller errors are rounding and count as
 
 
 class TruthCase(NamedTuple):
-    """A scene, a duration before its impacts accumulate [s], and whether the run includes device
-    and coupling."""
+    """A case of truths.yaml."""
 
     scene: str
     duration: float
-    coupled: bool
+    coupled: bool = False
+    quick: bool = False
 
 
-CASES = (
-    # one elastic impact
-    TruthCase("two_discs", 0.2, False),
-    # four elastic impacts, one after another
-    TruthCase("newton_cradle", 0.2, False),
-    # two simultaneous elastic impacts
-    TruthCase("bernoulli_balls", 0.1, False),
-    # plastic impact, contact that holds and lets go
-    TruthCase("two_link_arm_a", 0.3, False),
-    # plastic impact that takes all
-    TruthCase("two_link_arm_b", 0.3, False),
-    # no contact: the integrator alone
-    TruthCase("double_pendulum", 0.5, False),
-    # plastic impact and rest, with device and coupling
-    TruthCase("wall_1d", 1.0, True),
-    # three plastic impacts, with device and coupling
-    TruthCase("peg_corner", 0.36, True),
-    # two plastic impacts, with device and coupling
-    TruthCase("peg_room", 0.36, True),
-    # six contacts at once, with device and coupling
-    TruthCase("peg_hole", 0.36, True),
-    # one impact (e = 0.2) between moving bodies, before they accumulate
-    TruthCase("arm_pushing", 0.1, True),
-    # plastic impacts between moving bodies
-    TruthCase("three_link_arm_plastic", 0.45, False),
-    # elastic impacts between moving bodies
-    TruthCase("three_link_arm_elastic", 0.45, False),
-    # no contact: the hand pulls at a linkage
-    TruthCase("held_arm", 0.3, False),
-    # in space, no contact: quaternions and Euler's equations alone
-    TruthCase("tumbling_body", 0.5, False),
-    # in space: one impact (e = 0.6) of a spinning, eccentric ball
-    TruthCase("ball_dropped_in_space", 0.3, False),
-    # in space: impacts (e = 0.3) of two corners of a turning box
-    TruthCase("box_dropped_in_space", 0.2, False),
-    # in space: plastic impact of a corner, about which the box turns
-    TruthCase("box_landing_in_space", 0.19, False),
-    # in space: spheres of unequal mass, two impacts (e = 0.7)
-    TruthCase("cradle_in_space", 0.1, False),
-    # in space: an arm's plastic impact, contact that holds
-    TruthCase("arm_meets_a_wall_in_space", 0.3, False),
+CASES = tuple(
+    TruthCase(scene, **given) for scene, given in data_of(__file__, "truths.yaml").items()
 )
 
 
@@ -180,22 +142,10 @@ def _errors(
     return float(np.abs(run.q - q).max() * rate), float(np.abs(run.v - v).sum(axis=0).max())
 
 
-# the scenes of the quick depth
-QUICK = (
-    "two_discs",
-    "bernoulli_balls",
-    "two_link_arm_a",
-    "peg_corner",
-    "peg_hole",
-    "arm_pushing",
-    "ball_dropped_in_space",
-)
-
-
 CONVERGENCE = Check(
     key="convergence",
     question="Does the rigid world converge to the event-driven solution, at least at first order?",
-    cases=lambda study: [case for case in CASES if study.depth == "full" or case.scene in QUICK],
+    cases=lambda study: [case for case in CASES if case.quick or study.depth == "full"],
     row=lambda study, case: converge(case),
     targets=no_row_fails("scenes in which the rigid world does not converge"),
 )

@@ -13,11 +13,10 @@ from verification.complementarity.extensions import FRICTION, UNEQUAL
 from verification.complementarity.landings import LANDINGS
 from verification.complementarity.piles import PILES
 from verification.complementarity.solvers import SOLVER_TABLE, collections
+from verification.data import data_of
 from verification.mechanics.against_pinocchio import AGAINST_PINOCCHIO, IMPULSE_DYNAMICS
 from verification.mechanics.definiteness import POSITIVE_DEFINITE
-from verification.numbers import quoted, read_quotes
-
-QUOTES = Path(__file__).with_name("numbers.yaml")
+from verification.numbers import quoted
 
 
 def complementarity(folders: Mapping[str, Path]) -> Topic:
@@ -40,7 +39,7 @@ def complementarity(folders: Mapping[str, Path]) -> Topic:
             POSITIVE_DEFINITE,
             *collections(folders),
         ),
-        numbers=partial(quoted, read_quotes(QUOTES)),
+        numbers=partial(quoted, data_of(__file__, "numbers.yaml")),
     )
 
 

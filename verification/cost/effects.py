@@ -2,16 +2,14 @@
 save.
 
 Times are compared on one and the same motion: with the effects that the scene needs, and with every
-effect that has a switch, which then changes nothing. `LEFT_OUT` defines how an effect is left out:
-by other values of the scene, another law or coupling, or a switch of the compiled step; contacts
-between bodies cannot. A motion without an effect is another motion, so its time is not compared.
+effect that has a switch, which then changes nothing. left_out.yaml says how an effect is left out.
+A motion without an effect is another motion, so its time is not compared.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -30,8 +28,9 @@ from reference import Floats
 from reference.worlds import World, find_world
 from verification.clock import LEAST_ROUNDS, Times, take_turns
 from verification.cost.steps import RecordedLoop
+from verification.data import data_of
 from verification.finding import Failure, attempt, counted
-from verification.numbers import quoted, read_quotes
+from verification.numbers import quoted
 from verification.table import Columns, Row, Table, table_from
 
 ROUNDS = 9  # number of rounds; each loop runs once per round
@@ -39,42 +38,8 @@ SLOW = 0.5  # [s] a scene whose run takes longer has the least number of rounds
 SAMPLES = 400  # number of instants at which positions are compared
 
 
-LEFT_OUT: dict[str, dict[str, Any]] = {  # effect -> the variant of the scene without it, see `Loop`
-    **{
-        name: {"switches": (name,)}
-        for name in (
-            "varying_inertia",
-            "velocity_terms",
-            "joint_damping",
-            "joint_friction",
-            "joint_limits",
-            "unequal_restitution",
-        )
-    },
-    "hand_force": {
-        "values": {"hand.force": None, "hand.force_table": (), "hand.force_function": ()}
-    },
-    "wall_contacts": {"values": {"walls": ()}},
-    "impulses": {"impulses": False},
-    "coupling": {"coupled": False},
-    **{
-        name: {"values": {path: value}}
-        for name, path, value in (
-            ("gravity", "gravity", None),
-            ("self_collisions", "contact.self_collisions", False),
-            ("penalty_stiffness", "contact.stiffness", 0.0),
-            ("contact_damping", "contact.damping", 0.0),
-            ("friction", "contact.friction", 0.0),
-            ("clustering", "contact.cluster_distance", 0.0),
-            ("touch", "contact.impact_time", "step"),
-            ("coherence", "contact.coherence_distance", 0.0),
-            ("delay", "device.delay", 0),
-            ("quantisation", "device.position_resolution", None),
-            ("device_damping", "device.damping", None),
-            ("device_limits", "device.force_limit", None),
-        )
-    },
-}
+# effect -> the variant of the scene without it
+LEFT_OUT: dict[str, dict[str, Any]] = data_of(__file__, "left_out.yaml")
 # Effects that a switch of the step can turn on in a scene that does not need them; they then change
 # nothing. Friction in impacts and implicit contact are not among them, because they need arrays of
 # their own.
@@ -185,7 +150,7 @@ def _farthest(one: Floats, other: Floats) -> float | None:
 
 
 STEPS = "time of a step"
-QUOTES = Path(__file__).with_name("numbers.yaml")
+QUOTES = data_of(__file__, "numbers.yaml")
 UNMOVED = 1e-6  # [mm] rounding of positions, where another order of sums is chosen
 TIMED = ("step", "all on", "saved", "saved, lower", "saved, upper", "noise", "clear")
 
@@ -236,7 +201,7 @@ def steps_table(rows: Iterable[Row]) -> Table:
 def numbers_of(times: Table) -> Row:
     """Return the main numbers of the page: effects that are on, and the time that the others
     save."""
-    found = quoted(read_quotes(QUOTES), {STEPS: times})
+    found = quoted(QUOTES, {STEPS: times})
     return {
         **found,
         "saves": found["saved_median"] > found["noise_median"],

@@ -6,17 +6,16 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import cache, cached_property
-from pathlib import Path
+from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from ruamel.yaml import YAML
 
 from iapb.run import Run
 from iapb.scene import Scene, scene_from_text
 from reference.exact import condition_number, exact_impact, row_condition_number
+from verification.data import data_of
 from verification.hard_cases.exact_outcomes import FrictionalImpact, exact_poisson
 from verification.impacts import Floats
 from verification.scenes.books import risen, work_given
@@ -187,10 +186,9 @@ class TrajectoryCase:
 AnyCase = HardCase | TrajectoryCase
 
 
-@cache
 def written(file: str) -> dict[str, dict[str, Any]]:
-    """Return the impacts or scenes of a file beside this module, by name."""
-    found: dict[str, dict[str, Any]] = YAML(typ="safe").load(Path(__file__).with_name(file))
+    """Return the impacts, motions or scenes of a file beside this module, by name."""
+    found: dict[str, dict[str, Any]] = data_of(__file__, file)
     return found
 
 

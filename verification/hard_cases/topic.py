@@ -4,18 +4,18 @@ scenes."""
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from reference.one_thread import one_thread
 from verification.check import Check, Study, Topic
+from verification.data import data_of
 from verification.finding import Part
 from verification.hard_cases.case import NOT_TRIED, STABLE, AnyCase, TrajectoryCase
 from verification.hard_cases.catalogue import HARD_CASES
 from verification.hard_cases.judge import judge_hard_case, methods_for
-from verification.numbers import Values, quoted, read_quotes
+from verification.numbers import Values, quoted
 from verification.ordinary.judge import ORDINARY, THEIRS
 from verification.ordinary.touch import TOUCH
 from verification.table import Columns, Row, Table
@@ -24,7 +24,7 @@ ENGINE = ("factored", "IAPB")  # the engine's default impact method and its worl
 IMPACT = "impact"
 MOTION = "motion"
 INSTANTS = 600  # of a failing motion
-QUOTES = Path(__file__).with_name("numbers.yaml")
+QUOTES = data_of(__file__, "numbers.yaml")
 
 
 def _case(study: Study, name: str) -> AnyCase:
@@ -154,7 +154,7 @@ def _numbers(tables: Mapping[str, Table]) -> Values:
         "other_fails": len(others),
         **_failure_numbers(tables[FAILURE.key]),
         "mujoco_right": _right_in_mujoco(tables[ORDINARY.key]),
-        **quoted(read_quotes(QUOTES), tables),
+        **quoted(QUOTES, tables),
     }
 
 

@@ -11,14 +11,13 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ruamel.yaml import YAML
 
 from iapb.scene.expressions import function_of
 from iapb.scene.reading import scene_from_values
+from verification.data import data_of
 from verification.ordinary import quantities, truths
 from verification.ordinary.quantities import Motion as Motion
 
@@ -86,7 +85,7 @@ def stack(
                 "position": [x, x, y, 0.0, 0.0, 0.0, 1.0] if space else [x, y, 0.0],
             }
         )
-    floor = _read("scenes.yaml")["walls"]["ground" if space else "floor"]
+    floor = data_of(__file__, "scenes.yaml")["walls"]["ground" if space else "floor"]
     return {
         **({"dimensions": 3} if space else {}),
         "duration": duration,
@@ -137,16 +136,9 @@ def bounces(scene: Values, e: float, count: int, axis: int = 1) -> Values:
 FORMS: dict[str, Callable[..., Values]] = {"free": free, "stands": stands, "bounces": bounces}
 
 
-@cache
-def _read(file: str) -> dict[str, Values]:
-    """Return the content of a file beside this module."""
-    found: dict[str, Values] = YAML(typ="safe").load(Path(__file__).with_name(file))
-    return found
-
-
 def _case(family: str, name: str, known: Values) -> Case:
     """Return a case of cases.yaml; its form, or else its quantity, is the first key."""
-    written = _read("scenes.yaml")[name]
+    written = data_of(__file__, "scenes.yaml")[name]
     made = stack(**written["stack"]) if "stack" in written else written
     scene = {"name": name, "rate": 1000} | made
     form, given = next(iter(known.items()))
@@ -160,6 +152,6 @@ def _case(family: str, name: str, known: Values) -> Case:
 
 CASES: dict[str, Case] = {
     name: _case(family, name, known)
-    for family, cases in _read("cases.yaml").items()
+    for family, cases in data_of(__file__, "cases.yaml").items()
     for name, known in cases.items()
 }

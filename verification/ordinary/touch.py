@@ -9,12 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from ruamel.yaml import YAML
 from scipy.optimize import brentq
 
 from iapb.scene import Scene
@@ -23,6 +21,7 @@ from iapb.scene.reading import scene_from_values
 from reference import Floats
 from reference.worlds import run_world
 from verification.check import Check, Study, no_row_fails
+from verification.data import data_of
 from verification.ordinary.judge import THEIRS, WORLDS, is_installed
 from verification.table import Row
 
@@ -66,7 +65,7 @@ DISC = Outline(np.zeros((1, 2)), 0.1, 0.5 * 0.1**2)
 @cache
 def scene_named(name: str) -> Scene:
     """Return a scene of touch.yaml."""
-    return scene_from_values(YAML(typ="safe").load(Path(__file__).with_name("touch.yaml"))[name])
+    return scene_from_values(data_of(__file__, "touch.yaml")[name])
 
 
 def toss(state: Floats, restitution: float, friction: float, seconds: float) -> Scene:

@@ -58,7 +58,7 @@ class _Halved(RigidConstraints):
         return result._replace(v=0.5 * (before + result.v))
 
 
-@pytest.mark.parametrize("name", study.QUICK)
+@pytest.mark.parametrize("name", [case.scene for case in study.CASES if case.quick])
 def test_a_truth_does_not_depend_on_rounding(name: str) -> None:
     """Starts that differ by 1e-14 to 1e-12 have the same events and stay within the bound that the
     truth states.
