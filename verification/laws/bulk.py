@@ -87,38 +87,33 @@ def judged_impacts(family: str, impacts: int, method: str = OURS, seed: int = SE
     rng = np.random.default_rng([seed, *family.encode()])
     coordinates, contacts, batch = LARGEST[family]
     least = 0 if family == ANY_RANK else 1
-    gains = 0
     moved = 0
     cancelled = 0
-    share = 0.0
-    found: list[float] = []
+    gains: list[float] = []
+    shares: list[float] = []
     for start in range(0, impacts, batch):
         d = int(rng.integers(1, coordinates + 1))
         c = int(rng.integers(least, contacts + 1))
         with np.errstate(over="ignore", under="ignore"):
             given = draw_impacts(rng, family, min(batch, impacts - start), d, c)
         v_plus, clamps = METHODS[method](given, family == SCALED)
-        gained = judge_gains(given.mass, given.v, v_plus).gained
-        gains += int(gained.sum())
         moved += int((v_plus != given.v).any(axis=1).sum())
         cancelled += int((clamps <= 0.0).sum())
-        if gained.any():
-            each = zip(given.mass[gained], given.v[gained], v_plus[gained], strict=True)
-            relative = np.array([relative_energy_gain(*impact) for impact in each])
-            bound = 10.0 * d * EPS * np.sqrt(given.condition[gained])
-            found += relative.tolist()
-            share = max(share, float((relative / bound).max()))
+        for k in np.flatnonzero(judge_gains(given.mass, given.v, v_plus).gained):
+            gain = relative_energy_gain(given.mass[k], given.v[k], v_plus[k])
+            gains.append(gain)
+            shares.append(gain / (10.0 * d * EPS * float(np.sqrt(given.condition[k]))))
     return {
         "method": method,
         "family": family,
         "impacts": impacts,
-        "gains": gains,
-        GAIN: max(found, default=0.0),
-        MEDIAN: float(np.median(found)) if found else 0.0,
-        SHARE: share,
+        "gains": len(gains),
+        GAIN: max(gains, default=0.0),
+        MEDIAN: float(np.median(gains)) if gains else 0.0,
+        SHARE: max(shares, default=0.0),
         "moved": moved / impacts,
         "cancelled": cancelled,
-        HOLDS: _never_gains(method, gains, moved / impacts),
+        HOLDS: _never_gains(method, len(gains), moved / impacts),
     }
 
 

@@ -25,6 +25,7 @@ NOTABLE = 1e-6
 HANGS = "gave no"  # kind of the fault of a call that takes too long
 Shrinks = TypeVar("Shrinks")
 _DIGITS = (0, 1, 2, 4, 8)
+_ROUNDED = ("velocity", "contact_jacobian", "tangents", "mass_matrix", "friction", "unequal")
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,14 +244,7 @@ def _smaller(case: ImpactCase) -> Iterator[ImpactCase]:
         if case.unequal is None and case.restitution not in (1.0, e):
             yield replace(case, restitution=e)
     for digits in _DIGITS:
-        for name in (
-            "velocity",
-            "contact_jacobian",
-            "tangents",
-            "mass_matrix",
-            "friction",
-            "unequal",
-        ):
+        for name in _ROUNDED:
             yield from _rounded(case, name, digits)
 
 
@@ -299,6 +293,8 @@ def _is_valid(case: ImpactCase) -> bool:
 
 # A counterexample as the source code of a test, to paste next to the resolver.
 
+_ALWAYS = ("mass_matrix", "contact_jacobian", "velocity")
+_OPTIONAL = ("translations", "tangents", "friction", "unequal")
 _BY_NAME = {"KIT": KIT, "FACTORED": FACTORED, "ONE_SIDED": ONE_SIDED}
 
 
@@ -316,16 +312,9 @@ def as_test(
 
     The test makes the `earlier` calls first. A finite `limit` [s] ends a call that hangs.
     """
-    arrays = {
-        "mass_matrix": case.mass_matrix,
-        "contact_jacobian": case.contact_jacobian,
-        "velocity": case.velocity,
-    }
-    optional = {
-        name: getattr(case, name) for name in ("translations", "tangents", "friction", "unequal")
-    }
-    optional = {name: array for name, array in optional.items() if array is not None}
-    more = "".join(f", {name}={name}" for name in optional)
+    given = {name: getattr(case, name) for name in (*_ALWAYS, *_OPTIONAL)}
+    arrays = {name: array for name, array in given.items() if array is not None}
+    more = "".join(f", {name}={name}" for name in _OPTIONAL if name in arrays)
     table = "EXACT_LAWS" if law in EXACT_LAWS else CONTRACTS[contract].table
     table = "UNEQUAL_LAWS" if law.startswith("unequal_") else table
     name = next((name for name, known in _BY_NAME.items() if known == bounds), "")
@@ -344,8 +333,8 @@ def as_test(
         "",
         f"def test_{law}():",
         *_repeating(earlier),
-        *(f"    {key} = {written(array)}" for key, array in (arrays | optional).items()),
-        f"    case = ImpactCase(mass_matrix, contact_jacobian, velocity, {case.restitution!r}{more})",
+        *(f"    {key} = {written(array)}" for key, array in arrays.items()),
+        f"    case = ImpactCase({', '.join(_ALWAYS)}, {case.restitution!r}{more})",
         f"    residual = {table}[{law!r}].check(case, {called}, {tolerances})",
     ]
     return "\n".join(["import numpy as np", *head, *lines, "    assert residual.passed, residual"])

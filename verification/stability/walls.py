@@ -13,6 +13,7 @@ the following readings cause (5).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from scipy.linalg import expm
@@ -78,16 +79,20 @@ def touch_walls(loop: Loop, stiffness: Floats, damping: Floats, law: str) -> Flo
     (K, B) = np.broadcast_arrays(stiffness, damping)
     r = loop.resolution
     steps = round(loop.seconds * loop.rate)
+
+    def sensed(x: Floats) -> Floats:
+        return np.round(x / r) * r if r > 0.0 else x.copy()
+
     x = np.full(K.shape, -loop.distance)
     v = np.full(K.shape, loop.speed)
-    first = np.round(x / r) * r if r > 0.0 else x.copy()
+    first = sensed(x)
     # those that are delayed, oldest first
     readings = [first - loop.speed * loop.step, *[first] * (loop.delay + 1)]
     commands = [np.zeros(K.shape) for _ in range(loop.delay)]
     positions, speeds = (np.empty((steps, *K.shape)) for _ in range(2))
     free, moved, held = _held_force(loop)
     for k in range(steps):
-        readings = [*readings[1:], np.round(x / r) * r if r > 0.0 else x.copy()]
+        readings = [*readings[1:], sensed(x)]
         before, now = readings[:2]
         rate = (now - before) / loop.step
         command = np.where(now > 0.0, np.maximum(K * now + B * rate, 0.0), 0.0)
@@ -137,15 +142,9 @@ def loops() -> tuple[Loop, ...]:
 
     The paper's device has no physical damping.
     """
-    kinds = [
-        (rate, sensors, b)
-        for rate in (512.0, 1000.0)
-        for sensors in ((0, 0.0), LATE)
-        for b in (0.0, 5.0)
-    ]
     return tuple(
         Loop(rate=rate, device_damping=b, delay=delay, resolution=r)
-        for rate, (delay, r), b in kinds
+        for rate, (delay, r), b in product((512.0, 1000.0), ((0, 0.0), LATE), (0.0, 5.0))
     )
 
 

@@ -12,18 +12,18 @@ from verification.impacts import ImpactCase
 from verification.laws.bounds import FACTORED, KIT, LawCount, LawResidual
 from verification.laws.equality import LAWS
 from verification.laws.resolver import Resolver
-from verification.laws.strategies import impact_cases
+from verification.laws.strategies import impacts
 from verification.methods import damped, svd
 
 
 @pytest.mark.parametrize("law", LAWS)
-@given(case=impact_cases(largest_exponent=14))
+@given(case=impacts(largest_exponent=14))
 def test_the_default_method_keeps_its_proved_bounds(law: str, case: ImpactCase) -> None:
     residual = LAWS[law].check(case, resolve_impact, FACTORED)
     assert residual is None or residual.passed, residual
 
 
-@given(case=impact_cases(largest_exponent=14))
+@given(case=impacts(largest_exponent=14))
 @pytest.mark.parametrize("method", [damped, svd])
 def test_filters_of_the_family_are_passive(method: Resolver, case: ImpactCase) -> None:
     residual = LAWS["kinetic_energy"].check(case, method, KIT)
