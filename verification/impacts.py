@@ -486,48 +486,33 @@ def draw_frictional_case(
     """
     from reference.complementarity.solvers.sweeps import settles  # brings numba
 
+    kind = FRICTIONAL_KINDS[number % len(FRICTIONAL_KINDS)]
     while True:
-        case = _frictional_case(rng, number, largest_condition)
-        blocks = np.concatenate([case.contact_jacobian[:, None], np.asarray(case.tangents)], axis=1)
-        given = (
+        mass, rows, translations = _frictional_rows(rng, kind, largest_condition)
+        friction = rng.choice([0.0, 0.3, 1.0, float(rng.uniform(0.0, 2.0))], size=len(rows))
+        velocity = draw_velocity(rng, _one_of(rng, ("normal", "kinetic normal")), mass, rows[:, 0])
+        drawn = ImpactCase(
+            mass,
+            rows[:, 0],
+            velocity,
+            _push_restitution(rng),
+            f"{kind}, {len(rows)} contacts with friction",
+            translations,
+            tangents=rows[:, 1:],
+            friction=friction,
+        )
+        case = _signed(rng, drawn)
+        blocks = np.concatenate([case.contact_jacobian[:, None], rows[:, 1:]], axis=1)
+        problem = ImpactProblem.from_impact(
             case.mass_matrix,
             blocks.reshape(-1, case.coordinates),
             case.velocity,
             0.0,
-            case.friction,
+            friction,
+            contact_size=blocks.shape[1],
         )
-        if settles(ImpactProblem.from_impact(*given, contact_size=blocks.shape[1]), SWEEPS):
+        if settles(problem, SWEEPS):
             return case
-
-
-def _frictional_case(rng: np.random.Generator, number: int, largest_condition: float) -> ImpactCase:
-    kind = FRICTIONAL_KINDS[number % len(FRICTIONAL_KINDS)]
-    if kind == "generic":
-        d = int(rng.integers(2, ONE_SIDED_COORDINATES + 1))
-        c = int(rng.integers(1, 4))
-        m = int(rng.integers(1, min(3, d)))
-        mass = draw_mass_matrix(
-            rng, _one_of(rng, MASS_KINDS), d, 10.0 ** rng.uniform(0.0, np.log10(largest_condition))
-        )
-        drawn = rng.normal(size=(c, 1 + m, d))
-        translations = None
-        rows = drawn / np.linalg.norm(drawn, axis=2, keepdims=True)
-    else:
-        mass, rows, translations = _bodies(rng, kind)
-    c = len(rows)
-    friction = rng.choice([0.0, 0.3, 1.0, float(rng.uniform(0.0, 2.0))], size=c)
-    velocity = draw_velocity(rng, _one_of(rng, ("normal", "kinetic normal")), mass, rows[:, 0])
-    case = ImpactCase(
-        mass,
-        rows[:, 0],
-        velocity,
-        _push_restitution(rng),
-        f"{kind}, {c} contacts with friction",
-        translations,
-        tangents=rows[:, 1:],
-        friction=friction,
-    )
-    return _signed(rng, case)
 
 
 def _push_restitution(rng: np.random.Generator) -> float:
@@ -565,9 +550,20 @@ def _signed(rng: np.random.Generator, case: ImpactCase) -> ImpactCase:
     )
 
 
-def _bodies(rng: np.random.Generator, kind: str) -> tuple[Floats, Floats, Floats | None]:
-    """Return M, rows (c, 1 + m, d) of normals and tangents, and the translations, for one or two
-    rigid bodies."""
+def _frictional_rows(
+    rng: np.random.Generator, kind: str, largest_condition: float
+) -> tuple[Floats, Floats, Floats | None]:
+    """Return M, rows (c, 1 + m, d) of normals and tangents, and the translations: generic rows, or
+    those of one or two rigid bodies."""
+    if kind == "generic":
+        d = int(rng.integers(2, ONE_SIDED_COORDINATES + 1))
+        c = int(rng.integers(1, 4))
+        m = int(rng.integers(1, min(3, d)))
+        mass_kind = _one_of(rng, MASS_KINDS)
+        condition = 10.0 ** rng.uniform(0.0, np.log10(largest_condition))
+        mass = draw_mass_matrix(rng, mass_kind, d, condition)
+        drawn = rng.normal(size=(c, 1 + m, d))
+        return mass, drawn / np.linalg.norm(drawn, axis=2, keepdims=True), None
     inertia = 10.0 ** rng.uniform(-1.0, 0.0, size=6)  # arms are up to 0.7 m
     count = int(rng.integers(1, 4))
     if kind == "body in space":

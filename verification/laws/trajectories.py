@@ -386,11 +386,13 @@ def device_keeps_its_limits(trajectory: Trajectory) -> Found:
     return float(np.max(np.abs(run.device_force) / np.array(limit))), 1.0
 
 
-def judge_run(run: Run) -> Iterator[tuple[str, LawResidual]]:
+def judge_run(
+    run: Run, laws: dict[str, Law] = TRAJECTORY_LAWS
+) -> Iterator[tuple[str, LawResidual]]:
     """Yield the residual of every law that applies to a run; if the run is not finite, yield only
     that residual."""
     trajectory = Trajectory(run)
-    for name, one in TRAJECTORY_LAWS.items():
+    for name, one in laws.items():
         residual = one.check(trajectory)
         if residual is not None:
             yield name, residual

@@ -18,7 +18,7 @@ from iapb.simulation import simulate
 from iapb.worlds import find_world
 from verification.laws.bounds import Found, Law, LawCount, law
 from verification.laws.scenes import ROOM, Values, draw_scene, draw_spatial_scene
-from verification.laws.trajectories import Trajectory, judge_run, norm
+from verification.laws.trajectories import TRAJECTORY_LAWS, Trajectory, judge_run, norm
 from verification.scenes.books import risen, work_given
 
 STATE_LAWS: dict[str, Law] = {}
@@ -72,11 +72,8 @@ def bodies_stay_apart(trajectory: Trajectory) -> Found:
 def any_scene(values: Values) -> Scene:
     """Return a drawn scene with restitution and friction alone, and a hand that holds the tool
     itself."""
-    kept = {
-        name: value
-        for name, value in values.items()
-        if name not in ("device", "couplings", "integrator")
-    }
+    dropped = ("device", "couplings", "integrator")
+    kept = {name: value for name, value in values.items() if name not in dropped}
     contact = {name: value for name, value in values["contact"].items() if name in KEPT}
     return scene_from_values(kept | {"contact": contact})
 
@@ -108,12 +105,7 @@ def judge_world(
             left_out += 1
             continue
         run = simulate(scene, world=world)
-        found = dict(judge_run(run))
-        if found["finite"].passed:
-            trajectory = Trajectory(run)
-            states = {name: one.check(trajectory) for name, one in STATE_LAWS.items()}
-            found |= {name: residual for name, residual in states.items() if residual is not None}
-        for name, residual in found.items():
+        for name, residual in judge_run(run, TRAJECTORY_LAWS | STATE_LAWS):
             counts.setdefault(name, LawCount(name)).add(residual)
         if progress is not None:
             progress(index + 1, scenes)
