@@ -31,7 +31,7 @@ from verification.impacts import (
     whole_numbers,
 )
 from verification.methods import gram_cholesky, gram_pinv
-from verification.proofs.cases import pseudo_inverse
+from verification.proofs.numbers import pseudo_inverse
 from verification.table import Columns, Row
 
 

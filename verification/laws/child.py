@@ -43,7 +43,7 @@ class Child:
         if self._keeper == 0:
             try:
                 self._pipe.close()
-                _Keeper(resolver, theirs, limit).keep()
+                _keep(resolver, theirs, limit)
             finally:
                 os._exit(0)
         theirs.close()
@@ -86,51 +86,41 @@ def child_of(resolver: Resolver, limit: float) -> Iterator[Child | None]:
         child.close()
 
 
-class _Keeper:
-    """The processes' side: the keeper, and the worker that it forks."""
-
-    def __init__(self, resolver: Resolver, pipe: Connection, limit: float) -> None:
-        self.resolver = resolver
-        self.pipe = pipe
-        self.limit = limit
-
-    def keep(self) -> None:
-        """Fork a worker whenever the last one has ended."""
-        faulthandler.disable()  # a crash is told by the keeper
-        for number in (signal.SIGINT, signal.SIGALRM, signal.SIGTERM):
-            signal.signal(number, signal.SIG_DFL)
-        silent = os.open(os.devnull, os.O_WRONLY)
-        for stream in (1, 2):  # what the resolver prints belongs to its own process
-            os.dup2(silent, stream)
-        while True:
-            worker = os.fork()
-            if worker == 0:
-                try:
-                    os._exit(self.work())
-                finally:
-                    os._exit(_CLOSED)
-            status = os.waitpid(worker, 0)[1]
-            if os.WIFSIGNALED(status):
-                self.pipe.send((ResolverFault(self.ending(os.WTERMSIG(status))), ()))
-            elif os.WEXITSTATUS(status) == _CLOSED:
-                return
-
-    def ending(self, number: int) -> str:
-        """Words for the signal that ended a worker."""
-        if number == signal.SIGALRM:
-            return f"gave no answer within {self.limit:g} s"
-        return f"ended its process by {signal.Signals(number).name}"
-
-    def work(self) -> int:
-        """Answer calls; return the exit status of the worker."""
-        while True:
+def _keep(resolver: Resolver, pipe: Connection, limit: float) -> None:
+    """Fork a worker whenever the last one has ended."""
+    faulthandler.disable()  # a crash is told by the keeper
+    for number in (signal.SIGINT, signal.SIGALRM, signal.SIGTERM):
+        signal.signal(number, signal.SIG_DFL)
+    silent = os.open(os.devnull, os.O_WRONLY)
+    for stream in (1, 2):  # what the resolver prints belongs to its own process
+        os.dup2(silent, stream)
+    while True:
+        worker = os.fork()
+        if worker == 0:
             try:
-                given = self.pipe.recv()
-            except EOFError:
-                return _CLOSED
-            if given in (FRESH, LAST):
-                return 0 if given == FRESH else _CLOSED
-            signal.setitimer(signal.ITIMER_REAL, self.limit)
-            answer = answer_of(self.resolver, given)
-            signal.setitimer(signal.ITIMER_REAL, 0.0)
-            self.pipe.send((answer, given))
+                os._exit(_work(resolver, pipe, limit))
+            finally:
+                os._exit(_CLOSED)
+        status = os.waitstatus_to_exitcode(os.waitpid(worker, 0)[1])
+        if status == _CLOSED:
+            return
+        if status == -signal.SIGALRM:
+            pipe.send((ResolverFault(f"gave no answer within {limit:g} s"), ()))
+        elif status < 0:
+            name = signal.Signals(-status).name
+            pipe.send((ResolverFault(f"ended its process by {name}"), ()))
+
+
+def _work(resolver: Resolver, pipe: Connection, limit: float) -> int:
+    """Answer calls; return the exit status of the worker."""
+    while True:
+        try:
+            given = pipe.recv()
+        except EOFError:
+            return _CLOSED
+        if given in (FRESH, LAST):
+            return 0 if given == FRESH else _CLOSED
+        signal.setitimer(signal.ITIMER_REAL, limit)
+        answer = answer_of(resolver, given)
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        pipe.send((answer, given))

@@ -280,14 +280,12 @@ def text_length(array: np.ndarray) -> int:
 def _is_valid(case: ImpactCase) -> bool:
     """Whether M is positive definite up to rounding, by elimination in a fixed order and without
     BLAS."""
-    rows = case.mass_matrix.tolist()
-    least = 1e-14 * max(rows[k][k] for k in range(len(rows)))
-    for k, pivot_row in enumerate(rows):
-        if not pivot_row[k] > least:
+    rest = case.mass_matrix
+    least = 1e-14 * np.diag(rest).max()
+    while len(rest):
+        if not rest[0, 0] > least:
             return False
-        for row in rows[k + 1 :]:
-            factor = row[k] / pivot_row[k]
-            row[k:] = [x - factor * y for x, y in zip(row[k:], pivot_row[k:], strict=True)]
+        rest = rest[1:, 1:] - np.outer(rest[1:, 0] / rest[0, 0], rest[0, 1:])
     return tangents_are_independent(case)
 
 

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 from flint import fmpq, fmpq_mat
 
 from iapb.errors import ArgumentError
-from verification.proofs.words import ANY, Expression, Fact, Reader, names_in
+from verification.proofs.words import Expression, Fact, Reader, names_in
 
 Case = dict[str, fmpq_mat]
 _RELATIONS = {
@@ -84,24 +84,23 @@ def value_of(value: Expression, case: Case) -> fmpq_mat:
     """Return the rational matrix of an expression. Commuting scalars alone give a 1 x 1 matrix."""
     if missing := names_in(value) - set(case):
         raise ArgumentError("case", sorted(case), f"a value for {', '.join(sorted(missing))}")
-    sizes = {"1": 1, ANY: 1}
-    for letter in {each for _, word in value.terms for each in word}:
-        rows, cols = (letter.cols, letter.rows) if letter.flipped else (letter.rows, letter.cols)
-        sizes |= {rows: case[letter.name].nrows(), cols: case[letter.name].ncols()}
-    identity = fmpq_mat(
-        [[int(i == j) for j in range(sizes[value.rows])] for i in range(sizes[value.rows])]
-    )
-    total = fmpq_mat(sizes[value.rows], sizes[value.cols])
+    products = []
+    multiple = fmpq(0)  # of the identity
     for (scalars, word), coefficient in value.terms.items():
+        scale = fmpq(*coefficient.as_integer_ratio())
+        for name in scalars:
+            scale *= case[name][0, 0]
         factors = [
             case[each.name].transpose() if each.flipped else case[each.name] for each in word
         ]
-        scale = reduce(
-            operator.mul,
-            [case[name][0, 0] for name in scalars],
-            fmpq(*coefficient.as_integer_ratio()),
-        )
-        total += reduce(operator.mul, factors or [identity]) * scale
+        if factors:
+            products.append(reduce(operator.mul, factors) * scale)
+        else:
+            multiple += scale
+    total = sum(products[1:], products[0]) if products else fmpq_mat(1, 1)
+    if multiple:
+        for k in range(total.nrows()):
+            total[k, k] += multiple
     return total
 
 
@@ -130,30 +129,11 @@ def all_hold(facts: Iterable[Fact], case: Case) -> bool:
 
 
 def definite(value: fmpq_mat, *, strict: bool) -> bool:
-    """Whether x' A x >= 0 (strict: > 0) for every x other than 0, by exact elimination on the
-    symmetric part of A."""
-    a = (value + value.transpose()).tolist()
-    for k, row in enumerate(a):
-        if row[k] < 0 or (row[k] == 0 and (strict or any(row[k:]))):
-            return False
-        for other in a[k + 1 :] if row[k] else ():
-            other[:] = [x - other[k] / row[k] * y for x, y in zip(other, row, strict=True)]
-    return True
+    """Whether x' A x >= 0 (strict: > 0) for every x other than 0.
 
-
-def pseudo_inverse(matrix: Any) -> Any:
-    """Return the Moore-Penrose inverse of a rational matrix of python-flint.
-
-    A = C R, where C has the independent columns and R is the reduced echelon form; A† = Rᵀ(R
-    Rᵀ)⁻¹(CᵀC)⁻¹Cᵀ. Source: Ben-Israel and Greville, Generalized Inverses (2003), theorem 1.5
-    (MacDuffee).
+    All roots of the characteristic polynomial p of A + Aᵀ are real. By Descartes' rule none is
+    negative if no coefficient of ±p(−λ) is, and none is 0, either, if all are positive.
     """
-    reduced, rank = matrix.rref()
-    if rank == 0:
-        return matrix.transpose()
-    rows = reduced.tolist()[:rank]
-    pivots = [next(j for j, entry in enumerate(row) if entry) for row in rows]
-    echelon = fmpq_mat(rows)
-    columns = fmpq_mat([[row[j] for j in pivots] for row in matrix.tolist()])
-    left = (columns.transpose() * columns).solve(columns.transpose())
-    return echelon.transpose() * (echelon * echelon.transpose()).solve(left)
+    coefficients = (value + value.transpose()).charpoly().coeffs()
+    signed = [(-1) ** k * each for k, each in enumerate(reversed(coefficients))]
+    return all(each > 0 or (each == 0 and not strict) for each in signed)

@@ -7,6 +7,7 @@ import random
 from collections.abc import Callable
 from fractions import Fraction
 
+import sympy
 from flint import fmpq_mat
 
 from verification.proofs import by_sympy, layout
@@ -17,7 +18,6 @@ from verification.proofs.cases import (
     completed,
     holds,
     matrix_of,
-    pseudo_inverse,
     read_comparison,
 )
 from verification.proofs.statement import Statement
@@ -126,6 +126,12 @@ def random_case(draw: random.Random) -> Case:
         "G": pseudo_inverse(jacobian * inverse * jacobian.transpose()),
         "e": matrix_of([[Fraction(draw.randint(-6, 6), 6)]]),
     }
+
+
+def pseudo_inverse(matrix: fmpq_mat) -> fmpq_mat:
+    """Return the Moore-Penrose inverse, which SymPy finds; the hypotheses of the theorem check it."""
+    found = sympy.Matrix([[str(entry) for entry in row] for row in matrix.tolist()]).pinv()
+    return matrix_of([[str(entry) for entry in row] for row in found.tolist()])
 
 
 def exact_instances() -> tuple[Comparisons, Twins]:
