@@ -30,13 +30,9 @@ class LawResidual:
     @property
     def ratio(self) -> float:
         """value / tolerance; infinite if the value is not finite."""
-        if not math.isfinite(self.value):
-            return np.inf
-        return (
-            self.value / self.tolerance
-            if self.tolerance > 0.0
-            else (np.inf if self.value > 0.0 else 0.0)
-        )
+        if self.tolerance > 0.0 and math.isfinite(self.value):
+            return self.value / self.tolerance
+        return 0.0 if self.value <= 0.0 and math.isfinite(self.value) else np.inf
 
     @property
     def words(self) -> str:

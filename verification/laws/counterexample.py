@@ -137,13 +137,13 @@ class Hunt:
             failing = [case for case in (found, *drawn) if case is not None and fails(case)]
             if not failing:
                 continue
-            smallest = shrink(min(failing, key=_size), fails)
+            smallest = shrink(min(failing, key=_size), fails, smaller_impacts)
             if self.child is None or self.breaks(smallest, least, ()):
                 return smallest
             break
         fails = partial(self.breaks, earlier=())
         fresh = next((case for case in drawn if fails(case)), None)
-        return None if fresh is None else shrink(fresh, fails)
+        return None if fresh is None else shrink(fresh, fails, smaller_impacts)
 
     def after_calls(
         self, case: ImpactCase, calls: Sequence[bytes]
@@ -168,9 +168,10 @@ class Hunt:
             size //= 2
         for count in (1, len(earlier)):  # the same call again and again says it best
             if self.repeats(count, case):
-                again = shrink(case, partial(self.repeats, count))
+                again = shrink(case, partial(self.repeats, count), smaller_impacts)
                 return again, tuple(_again(again, count))
-        return shrink(case, partial(self.breaks, earlier=earlier)), tuple(earlier)
+        fails = partial(self.breaks, earlier=earlier)
+        return shrink(case, fails, smaller_impacts), tuple(earlier)
 
     def repeats(self, count: int, case: ImpactCase) -> bool:
         """Whether a fresh resolver breaks the law after the impact's own call, `count` times."""
@@ -207,25 +208,22 @@ def _size(case: ImpactCase) -> int:
 def shrink(
     case: Shrinks,
     fails: Callable[[Shrinks], bool],
-    smaller_of: Callable[[Shrinks], Iterator[Shrinks]] | None = None,
+    smaller_of: Callable[[Shrinks], Iterator[Shrinks]],
 ) -> Shrinks:
     """Return a smaller case that still fails, greedily; the case itself if nothing smaller does.
 
     The search ends, because each step removes the translations, a row, a coordinate, a restitution
     other than 1, or digits. The result depends only on the answers of `fails`.
     """
-    improved = True
-    while improved:
-        improved = False
-        for smaller in (smaller_of or _valid)(case):
-            if fails(smaller):
-                case = smaller
-                improved = True
-                break
-    return case
+    while True:
+        smaller = next(filter(fails, smaller_of(case)), None)
+        if smaller is None:
+            return case
+        case = smaller
 
 
-def _valid(case: Any) -> Iterator[Any]:
+def smaller_impacts(case: ImpactCase) -> Iterator[ImpactCase]:
+    """Yield simpler impacts with a positive definite M, and independent normal and tangents."""
     return filter(_is_valid, _smaller(case))
 
 
@@ -245,7 +243,7 @@ def _smaller(case: ImpactCase) -> Iterator[ImpactCase]:
             yield replace(case, restitution=e)
     for digits in _DIGITS:
         for name in _ROUNDED:
-            yield from _rounded(case, name, digits)
+            yield from rounded(case, name, digits)
 
 
 def _without(case: ImpactCase, names: tuple[str, ...], index: int, axis: int) -> ImpactCase:
@@ -261,7 +259,7 @@ def _without(case: ImpactCase, names: tuple[str, ...], index: int, axis: int) ->
     )
 
 
-def _rounded(case: ImpactCase, name: str, digits: int) -> Iterator[ImpactCase]:
+def rounded(case: Any, name: str, digits: int) -> Iterator[Any]:
     """Yield the case with the array rounded to `digits` decimals, if that makes the array's text
     shorter."""
     array = getattr(case, name)

@@ -14,6 +14,7 @@ from verification.check import SEED, Check, Study
 from verification.finding import Part, of_each
 from verification.laws import LAWS, PLANTED_BUGS, check_passivity, engine, planted
 from verification.laws.bounds import LawCount
+from verification.laws.resolver import Resolver
 from verification.laws.scenes import SceneCase, draw_scene, draw_spatial_scene
 from verification.laws.trajectories import TRAJECTORY_LAWS, judge_run
 from verification.methods import gram_pinv
@@ -125,26 +126,25 @@ LAW_TABLE = Check(  # the worst of random cases depends on rounding: it is print
 )
 
 
-def printed_formula() -> Row:
-    """Return the kit's counterexample to equations (20)-(21) as printed (`gram_pinv`)."""
-    return _found("printed formula", gram_pinv, "kinetic_energy", impacts=COUNTER_IMPACTS)
-
-
-def restitution_per_contact() -> Row:
-    """Return the counterexample to the obvious extension of (15): equalities with one restitution
-    per row."""
-    return _found(
-        "J v⁺ = −E J v⁻, one e per contact",
+# resolver, the law that it breaks, and how the kit is asked: equations (20)-(21) as printed, and the
+# obvious extension of (15) to one restitution per row, as equalities
+OTHERS: dict[str, tuple[Resolver, str, dict[str, Any]]] = {
+    "printed formula": (gram_pinv, "kinetic_energy", {"impacts": COUNTER_IMPACTS}),
+    "J v⁺ = −E J v⁻, one e per contact": (
         planted.each_contact_its_own_restitution,
         "unequal_kinetic_energy",
-        impacts=COUNTER_IMPACTS // 2,
-        unequal_restitution=True,
-        laws=["unequal_kinetic_energy"],
-    )
+        {
+            "impacts": COUNTER_IMPACTS // 2,
+            "unequal_restitution": True,
+            "laws": ["unequal_kinetic_energy"],
+        },
+    ),
+}
 
 
-def _found(title: str, resolver: Any, law: str, **how: Any) -> Row:
-    """Return the smallest impact that the kit finds for a resolver that breaks the law."""
+def _found(title: str) -> Row:
+    """Return the smallest impact that the kit finds for a resolver that breaks a law."""
+    resolver, law, how = OTHERS[title]
     report = check_passivity(resolver, search=SEARCH, **how)
     case = report.counterexample
     if case is None or report.counterexample_law != law:
@@ -166,14 +166,10 @@ def _found(title: str, resolver: Any, law: str, **how: Any) -> Row:
     }
 
 
-MAKERS: dict[str, Callable[[], Row]] = {
-    "printed formula": printed_formula,
-    "one e per contact": restitution_per_contact,
-}
 COUNTEREXAMPLES = Check(
     key="counterexamples",
     question="Which small inputs make other solvers gain energy?",
-    cases=lambda study: MAKERS,
-    row=lambda study, name: MAKERS[name](),
+    cases=lambda study: OTHERS,
+    row=lambda study, title: _found(title),
     columns=Columns(prose=("M", "J", "v⁻", "e", "v⁺", "test", "relative energy gain")),
 )

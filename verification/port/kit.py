@@ -305,7 +305,7 @@ class _Trial:
         search.look()
         yield
         damping_goal, friction_goal = search.goals
-        most = [self.most(goal) for goal in search.goals]
+        most = [search.most(goal) for goal in search.goals]
         self.damping, self.friction = (one.needed for one in most)
         other = search.from_rest(friction_goal, most[0].motion, LONG)  # it needs some friction, too
         self.friction = max(self.friction, other.needed)
@@ -325,22 +325,12 @@ class _Trial:
             slow = replace(
                 search, goals=(damping_goal,), fastest=fastest, best={}, planes=[], effort=effort
             )
-            self.slow = self.searched(slow).needed
+            slow.look()
+            self.slow = slow.most(damping_goal).needed
         yield
         if edge and not search.late:
             self.edge = self.edge_found()
         yield
-
-    def most(self, goal: Goal) -> Found:
-        """Improve the best motions for a goal; return the best from rest."""
-        self.search.improve(goal)
-        return self.search.confirmed(goal)
-
-    def searched(self, search: Search) -> Found:
-        """Do a search of its own for one goal; return the best."""
-        search.look()
-        search.improve(search.goals[0])
-        return search.confirmed(search.goals[0])
 
     def edge_found(self) -> Floats:
         """Return points (b, f_c) of the edge, from 0 to beyond the device and its corner."""
@@ -361,7 +351,8 @@ class _Trial:
         own = replace(self.search, goals=(goal,), best={}, longest=LONG, effort=effort)
         for motion in self.search.known():
             own.try_on(motion)
-        return self.searched(own)
+        own.look()
+        return own.most(goal)
 
     def judge(self, name: str, motion: Motion) -> None:
         """Judge a law on a motion, if the law was chosen."""

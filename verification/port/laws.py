@@ -11,7 +11,7 @@ import numpy as np
 from reference import Floats
 from verification.impacts import EPS
 from verification.laws.bounds import Found, Law, law
-from verification.laws.counterexample import text_length
+from verification.laws.counterexample import rounded
 from verification.port.device import Motion, Port, sums_of
 
 FORCE_LAWS: dict[str, Law] = {}
@@ -144,7 +144,4 @@ def smaller_motions(motion: Motion) -> Iterator[Motion]:
         yield replace(motion, lead=np.delete(lead, k, axis=0))
     for digits in (3, 4, 5, 6, 7, 8):
         for name in ("lead", "cycle", "start"):
-            array = getattr(motion, name)
-            rounder = np.round(array, digits) + 0.0
-            if text_length(rounder) < text_length(array):
-                yield replace(motion, **{name: rounder})
+            yield from rounded(motion, name, digits)

@@ -292,6 +292,11 @@ class Search:
 
     # improvement
 
+    def most(self, goal: Goal) -> Found:
+        """Improve the best motions for a goal; return the best from rest."""
+        self.improve(goal)
+        return self.confirmed(goal)
+
     def improve(self, goal: Goal) -> None:
         """Improve the best cycles of some speeds for a goal, and then again the best of all."""
         for rank in (0, 1, 2, 0):
