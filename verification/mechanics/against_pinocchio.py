@@ -48,7 +48,6 @@ ROBOTS = Path(__file__).parents[3] / "shared" / "robots"
 SHIPPED = Path(__file__).parents[2] / "scenes"
 KIND_SIZES = (1, 6)  # number of joints of a tree with one kind of joint
 Pairs = list[tuple[Mechanism, PinocchioMechanism]]
-Pair = tuple[Any, Any]  # a quantity of ours, and of the reference
 
 TREES_SET = "random trees"
 OTHERS = "robots beside the checkout"
@@ -155,36 +154,39 @@ def compare(
     arm, and v x m v, which is zero but is computed from terms of the size of twice the kinetic
     energy. Point Jacobians are compared at a point one metre off each body's origin.
     """
-    m = mechanism
-    p = reference
     dv = np.cos(np.arange(mechanism.nv))
-    (rotations, positions) = m.placements(q)
-    (axes, origins, rows) = p.bodies(q)
-    places = list[Pair]()
-    frames = list[Pair]()
-    points = list[Pair]()
-    for b, name in enumerate(m.names):
-        k = p.index(name)
-        point = positions[b] + (0.6, 0.0, -0.8)
-        places += [(rotations[b], axes[k]), (positions[b], origins[k])]
-        frames += [(m.frame_jacobian(q, b), rows[k])]
-        points += [(m.point_jacobian(q, b, point), at_lever(rows[k], point - origins[k]))]
-    apart = relative_difference
-    lifted = float(np.linalg.norm(gravity)) * _spread(m, q)
+    lifted = float(np.linalg.norm(gravity)) * _spread(mechanism, q)
+
+    def apart(name: str, *given: Any, floor: float = 0.0) -> float:
+        ours, theirs = (getattr(each, name)(*given) for each in (mechanism, reference))
+        return relative_difference(ours, theirs, floor)
+
     return {
-        "mass matrix": apart([(m.mass_matrix(q), p.mass_matrix(q))]),
-        "placements and Jacobians": max(map(apart, (places, frames, points))),
-        "bias": apart([(m.bias(q, v), p.bias(q, v))], _swung(m, q, v)),
-        "gravity": apart([(m.gravity(q, gravity), p.gravity(q, gravity))]),
-        "inverse dynamics": apart(
-            [(m.inverse_dynamics(q, v, dv, gravity), p.inverse_dynamics(q, v, dv, gravity))]
-        ),
+        "mass matrix": apart("mass_matrix", q),
+        "placements and Jacobians": _bodies_apart(mechanism, reference, q),
+        "bias": apart("bias", q, v, floor=_swung(mechanism, q, v)),
+        "gravity": apart("gravity", q, gravity),
+        "inverse dynamics": apart("inverse_dynamics", q, v, dv, gravity),
         "energies": max(
-            apart([(m.kinetic_energy(q, v), p.kinetic_energy(q, v))]),
-            apart([(m.potential_energy(q, gravity), p.potential_energy(q, gravity))], lifted),
+            apart("kinetic_energy", q, v), apart("potential_energy", q, gravity, floor=lifted)
         ),
-        "momentum": apart([(m.centroidal_momentum(q, v), p.centroidal_momentum(q, v))]),
+        "momentum": apart("centroidal_momentum", q, v),
     }
+
+
+def _bodies_apart(mechanism: Mechanism, reference: PinocchioMechanism, q: Floats) -> float:
+    """Return the largest difference of placements, of Jacobians, and of Jacobians of points."""
+    order = [reference.index(name) for name in mechanism.names]
+    axes, origins, rows = (each[order] for each in reference.bodies(q))
+    rotations, positions = mechanism.placements(q)
+    points = positions + (0.6, 0.0, -0.8)
+    bodies = range(len(order))
+    at_points = [at_lever(rows[b], points[b] - origins[b]) for b in bodies]
+    return max(
+        relative_difference(np.dstack([rotations, positions]), np.dstack([axes, origins])),
+        relative_difference([mechanism.frame_jacobian(q, b) for b in bodies], rows),
+        relative_difference([mechanism.point_jacobian(q, b, points[b]) for b in bodies], at_points),
+    )
 
 
 def _swung(mechanism: Mechanism, q: Floats, v: Floats) -> float:
@@ -203,11 +205,11 @@ def _spread(mechanism: Mechanism, q: Floats) -> float:
     )
 
 
-def relative_difference(pairs: list[Pair], floor: float = 0.0) -> float:
-    """Return the largest |ours - theirs| of all pairs, divided by the larger of `floor` and the
-    largest |theirs|."""
-    scale = max([floor, *(float(np.max(np.abs(theirs), initial=0.0)) for _, theirs in pairs)])
-    gap = max([0.0, *(float(np.max(np.abs(ours - theirs), initial=0.0)) for ours, theirs in pairs)])
+def relative_difference(ours: ArrayLike, theirs: ArrayLike, floor: float = 0.0) -> float:
+    """Return the largest |ours - theirs|, divided by the larger of `floor` and the largest
+    |theirs|."""
+    scale = max(floor, float(np.max(np.abs(theirs), initial=0.0)))
+    gap = float(np.max(np.abs(np.subtract(ours, theirs)), initial=0.0))
     return gap / scale if scale > 0.0 else gap
 
 

@@ -24,9 +24,9 @@ def _definite(study: Study, joints: int) -> Row:
     for _ in range(count):
         mechanism = random_mechanism(rng, joints)
         mass = mechanism.mass_matrix(random_state(rng, mechanism)[0])
-        scale = np.sqrt(np.diag(mass))  # removes the units of the coordinates
-        if not len(mass) or not np.all(scale > 0.0):
+        if not len(mass) or not np.all(np.diag(mass) > 0.0):
             continue
+        scale = np.sqrt(np.diag(mass))  # removes the units of the coordinates
         values = np.linalg.eigvalsh(mass / np.outer(scale, scale))
         condition = float(np.abs(values).max() / np.abs(values).min())
         if condition <= LARGEST_CONDITION:
