@@ -31,6 +31,7 @@ from verification.cost.steps import RecordedLoop
 from verification.data import data_of
 from verification.finding import Failure, attempt, counted
 from verification.numbers import quoted
+from verification.scenes.points import placed, points_of
 from verification.table import Columns, Row, Table, table_from
 
 ROUNDS = 9  # number of rounds; each loop runs once per round
@@ -279,25 +280,16 @@ class Loop(RecordedLoop):
         """
         held = self.simulation.port.hand_body
         mechanism = self.simulation.system.mechanism
-        found = []
-        bodies = slice(None) if held < 0 else slice(held, held + 1)
-        states = self.states("q")
-        for q in states:
-            for body, R, p in zip(
-                *(each[bodies] for each in (mechanism.bodies, *mechanism.placements(q))),
-                strict=True,
-            ):
-                radius = (
-                    float(np.sqrt(np.trace(body.inertia) / (2.0 * body.mass)))
-                    if body.mass > 0.0
-                    else 0.0
-                )
-                center = p + R @ np.asarray(body.center_of_mass)
-                found.append((center, *(center + radius * R.T)))
-        return np.array(found).reshape(len(states), -1, 3)
+        chosen = slice(None) if held < 0 else slice(held, held + 1)
+        place, turn = placed(mechanism, self.states("q"))
+        bodies = mechanism.bodies
+        arms = [np.sqrt(np.trace(one.inertia) / (2.0 * (one.mass or np.inf))) for one in bodies]
+        offset = np.array([one.center_of_mass for one in bodies])
+        center = place + (turn @ offset[:, :, None])[..., 0]
+        found = points_of(center, turn, np.array(arms)[:, None, None])[:, chosen]
+        return found.reshape(len(found), -1, 3)
 
     def kinetic(self) -> Floats:
         """Return the kinetic energy at the compared instants (n,) [J]."""
-        states = zip(self.states("q"), self.states("v"), strict=True)
-        energy = self.simulation.system.mechanism
-        return np.array([energy.kinetic_energy(q, v) for q, v in states])
+        mechanism = self.simulation.system.mechanism
+        return mechanism.energies(self.states("q"), self.states("v"), np.zeros(3))[0]

@@ -24,7 +24,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from iapb.run import Run
 from iapb.scene import Scene, load_scene
@@ -39,6 +38,7 @@ from verification.check import Check, Study
 from verification.clock import timed
 from verification.cost.steps import IDEAL, RecordedLoop
 from verification.finding import attempt
+from verification.scenes.points import placed, points_of
 from verification.table import Columns, Row, Table
 
 FOLDER = Path(__file__).with_name("scenes") / "motions"
@@ -345,13 +345,8 @@ class Judge:
         return kinetic + potential
 
     def _points(self, q: Floats) -> Floats:
-        """Return the centre of each body and a point beside it (n, 2 b, 3) [m], in world axes."""
-        pose = self.mechanism.poses(q, planar=False)
-        turned = Rotation.from_quat(pose[..., 3:].reshape(-1, 4)).apply(
-            [0.5 * self.length, 0.0, 0.0]
-        )
-        center = pose[..., :3]
-        return np.concatenate([center, center + turned.reshape(center.shape)], axis=1)
+        """Return the centre of each body and a point beside it (n, b, 2, 3) [m], in world axes."""
+        return points_of(*placed(self.mechanism, q), 0.5 * self.length, (0,))
 
 
 MOTIONS = Check(

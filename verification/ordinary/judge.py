@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from importlib.util import find_spec
 
-import numpy as np
-from scipy.spatial.transform import Rotation
-
 from iapb.run import Run
+from iapb.scene.mechanism import mechanism_of
 from iapb.scene.reading import scene_from_values
 from reference.worlds import run_world
 from verification.check import Check, Study, no_row_fails
 from verification.ordinary.quantities import Motion
 from verification.ordinary.scenes import CASES
+from verification.scenes.books import scene_of
+from verification.scenes.points import placed
 from verification.table import Row
 
 OURS = "IAPB"
@@ -22,15 +22,8 @@ WORLDS = {OURS: "IAPB", THEIRS: "mujoco"}
 
 def motion_of(run: Run) -> Motion:
     """Return the motion of a run."""
-    pose = run.pose
-    bodies = pose.shape[:2]
-    if pose.shape[2] == 3:
-        place = np.pad(pose[..., :2], ((0, 0), (0, 0), (0, 1)))
-        turned = Rotation.from_euler("z", pose[..., 2:].reshape(-1, 1))
-    else:
-        place = pose[..., :3]
-        turned = Rotation.from_quat(pose[..., 3:].reshape(-1, 4))
-    return Motion(run.time, place, turned.as_matrix().reshape(*bodies, 3, 3))
+    mechanism = mechanism_of(scene_of(run))
+    return Motion(run.time, *placed(mechanism, run.q))
 
 
 def error_in(name: str, world: str) -> float | None:

@@ -10,6 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from verification.scenes.points import points_of
+
 Floats = NDArray[np.float64]
 ALL = slice(None)
 
@@ -113,21 +115,15 @@ def time_of_turn(motion: Motion, body: int, angle: float) -> Any:
     return motion.time[np.argmax(motion.angle(body) < angle)]
 
 
-def points(motion: Motion, arm: float, axes: Sequence[int]) -> Floats:
-    """The origin of each body and the points at `arm` along its axes, over time [m]."""
-    ends = motion.place[..., None, :] + arm * np.swapaxes(motion.turn, -1, -2)
-    return np.concatenate([motion.place[..., None, :], ends[..., axes, :]], axis=-2)
-
-
 def at_instants(motion: Motion, arm: float, axes: Sequence[int]) -> Floats:
     """The points of all bodies at five instants [m]."""
     chosen = np.linspace(0, len(motion.time) - 1, 6)[1:].round().astype(int)
-    return points(motion, arm, axes)[chosen]
+    return points_of(motion.place, motion.turn, arm, axes)[chosen]
 
 
 def way(motion: Motion, arm: float, axes: Sequence[int]) -> Any:
     """The longest way of a point [m], in the axes of the first body's origin, so that the drift of
     a free body does not count."""
-    ends = points(motion, arm, axes)
+    ends = points_of(motion.place, motion.turn, arm, axes)
     steps = np.diff(ends - ends[:, :1, :1], axis=0)
     return np.linalg.norm(steps, axis=-1).sum(axis=0).max()

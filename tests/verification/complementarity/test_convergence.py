@@ -58,17 +58,16 @@ class _Halved(RigidConstraints):
         return result._replace(v=0.5 * (before + result.v))
 
 
-@pytest.mark.parametrize("name", [case.scene for case in study.CASES if case.quick])
-def test_a_truth_does_not_depend_on_rounding(name: str) -> None:
+@pytest.mark.parametrize("case", study.QUICK)
+def test_a_truth_does_not_depend_on_rounding(case: study.TruthCase) -> None:
     """Starts that differ by 1e-14 to 1e-12 have the same events and stay within the bound that the
     truth states.
 
     With the contacts' forces taken one by one, these starts gave bernoulli_balls 1, 6 or more than
     60 events.
     """
-    case = BY_SCENE[name]
-    scene = study.scene_of(name)
-    truth = truth_of(name)
+    scene = study.scene_of(case.scene)
+    truth = truth_of(case.scene)
     start = System(scene).make_state()
     time = np.linspace(0.0, case.duration, 101)
     rng = np.random.default_rng(0)
