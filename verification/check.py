@@ -97,10 +97,6 @@ class Study:
         """Return a scene of the project by name."""
         return self.once(("scene", name), lambda: load_scene(find_scene(name)))
 
-    def wants(self, part: str) -> bool:
-        """Return whether rows of parts whose name begins like this are needed."""
-        return not self.part or self.part.startswith(part)
-
     def each(
         self, cases: Iterable[Case], results: Callable[[Case], Iterable[Result]]
     ) -> Iterator[Result]:

@@ -6,7 +6,7 @@ A report takes the tables of CLAIMED from the claims, so that nothing is measure
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -151,11 +151,6 @@ def motion_targets(motions: Table) -> Iterator[Part]:
             yield Part.on(name, row["time"], 1.0, timed=True)
 
 
-def no_targets(_: Table) -> Sequence[Part]:
-    """Return no part: the claim has its own verdict."""
-    return ()
-
-
 def _times(tables: Mapping[str, Table]) -> Values:
     """Return the numbers that the page on speed quotes; all of them depend on times."""
     parts = [part for check in BENCH.checks for part in check.judge(tables[check.key])]
@@ -180,7 +175,6 @@ EACH = Check(
     question="How fast is each case, beside the others?",
     cases=lambda study: list(ratios(study)),
     row=lambda _, row: row,
-    targets=no_targets,
     columns=Columns(timed=TIMED, timed_rows=True),
 )
 RATIOS = Check(
@@ -196,13 +190,13 @@ BENCH = Topic(
     title="Speed",
     question="What does accuracy cost, and is it fast enough?",
     checks=(
-        replace(steps.RACES, targets=no_targets),
+        steps.RACES,
         replace(C19, targets=growth_targets),
-        replace(C22, targets=no_targets),
+        replace(C22, targets=lambda _: ()),
         steps.BODIES,
-        replace(robots.ROBOTS, targets=no_targets),
+        robots.ROBOTS,
         replace(MOTIONS, targets=motion_targets),
-        replace(WORTH, targets=no_targets),
+        WORTH,
         EACH,
         RATIOS,
     ),

@@ -313,7 +313,7 @@ def _lost(study: Study, condition: Condition) -> Iterator[Row]:
         OVERLAP: [*map(device_overlap, traces.values())],
         SETTLING: [*map(settling_times, traces.values())],
     }
-    if any(map(study.wants, COORDINATES)):
+    if not study.part or study.part.startswith(COORDINATES):
         ideal = trace(study, condition, "ideal")
         window = comparison_window([ideal, *traces.values()])
         far = [root_mean_square(one, ideal, window) for one in traces.values()]

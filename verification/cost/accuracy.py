@@ -79,7 +79,7 @@ WAYS: tuple[Way, ...] = (
     Way(QP, "active set", PYTHON, calls.daqp_call),
 )
 SIZES = ((1, 3), (4, 3), (20, 6), (60, 12), (300, 30), (1000, 30))  # (contacts, coordinates)
-ROUNDS = 5
+ROUNDS = 5  # in random order, each method after a warm-up call
 LONGEST = (
     1e-2  # [s] largest time of a call: a slower method is timed once and skips all further impacts
 )
@@ -103,7 +103,6 @@ def _hard(sizes: Iterable[tuple[int, int]]) -> list[Hard]:
 
 def work_precision(
     sizes: Iterable[tuple[int, int]] = SIZES,
-    rounds: int = ROUNDS,
     progress: Callable[[int, int], None] | None = None,
     failures: list[Failure] | None = None,
 ) -> Table:
@@ -112,8 +111,6 @@ def work_precision(
     Parameters
     ----------
     sizes : (contacts, coordinates) of each size
-    rounds : number of times that each method is timed, in random order, each time after a warm-up
-        call
     progress : called as progress(impacts done, number of impacts)
     failures : receives exceptions other than `IapbError`, which gives a row; if it is None, they
         propagate
@@ -125,13 +122,12 @@ def work_precision(
         the exact (KE⁺ − KE⁻)/KE⁻, or 0 for a loss. The outcome is "ok", "too slow" (more than
         LONGEST), or "failed" with its reason.
     """
-    study = Study(failures=failures)
     cases = _hard(sizes)
     each = counted(cases, progress) if progress else cases
-    return ACCURACY.table_of(study.each(each, partial(_measured, rounds, study)))
+    return ACCURACY.table(Study(failures=failures), each)
 
 
-def _measured(rounds: int, study: Study, case: Hard) -> Iterator[Row]:
+def _measured(study: Study, case: Hard) -> Iterator[Row]:
     """Yield the rows of one impact; a way that was too slow on an earlier impact is not tried
     again."""
     problem = timed_problem(*case)
@@ -151,7 +147,7 @@ def _measured(rounds: int, study: Study, case: Hard) -> Iterator[Row]:
             for way, one in tried.items()
             if one.call is not None and not one.fault and one.seconds < LONGEST
         }
-        times = take_turns(samplers, rounds, warm=False, enough=_ENOUGH)
+        times = take_turns(samplers, ROUNDS, warm=False, enough=_ENOUGH)
     for way, one in tried.items():
         row: dict[str, Any] = {
             "contacts": problem.contacts,
@@ -211,7 +207,7 @@ ACCURACY = Check(
     key="accuracy",
     question="How exact is an impact in the time that it takes?",
     cases=lambda _: _hard(SIZES),
-    row=partial(_measured, ROUNDS),
+    row=_measured,
     columns=Columns(timed=MEASURED, timed_rows=True),
 )
 

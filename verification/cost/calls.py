@@ -13,7 +13,7 @@ import numpy as np
 
 from iapb import resolve_impact
 from iapb.contact.kernels.impact import ImpactWork, factored_impacts
-from iapb.errors import MissingDependencyError, SolverError, installing
+from iapb.errors import SolverError, name_the_extra
 from iapb.numerics.compiled import block
 from iapb.numerics.schema import zeros_of
 from reference.complementarity import ImpactProblem, solve
@@ -96,10 +96,8 @@ def kernels() -> Any:
     """Return the module of solvers that numba compiles; to import it takes a second."""
     try:
         return import_module("verification.cost.kernels")
-    except ImportError as error:
-        raise MissingDependencyError(
-            "quantecon", "Lemke kernel", installing("reference")
-        ) from error
+    except ModuleNotFoundError as error:
+        raise name_the_extra(error, "Lemke kernel") from error
 
 
 DAQP_TOLERANCE = (
@@ -115,8 +113,8 @@ def daqp_call(case: ImpactCase) -> Call:
     """
     try:
         import daqp
-    except ImportError as error:
-        raise MissingDependencyError("daqp", "DAQP", installing("reference")) from error
+    except ModuleNotFoundError as error:
+        raise name_the_extra(error, "DAQP") from error
     mass, rows, v = map(np.ascontiguousarray, case.arrays)
     c, d = rows.shape
     lower = np.zeros((d, d))

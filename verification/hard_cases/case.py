@@ -117,7 +117,7 @@ class FrictionalCase(HardCase):
     tangent: Floats = field(kw_only=True)
     friction: float = field(kw_only=True)
     law = (
-        "Newton's restitution law with Coulomb friction, in exact fractions and ball arithmetic. "
+        "Newton's restitution law with Coulomb friction, in exact fractions; a square root has 400 bits. "
         "If these laws gain "
         "energy, the friction impulse is scaled down until the gain is zero"
     )
@@ -140,7 +140,7 @@ class FrictionalCase(HardCase):
         )
 
     def exact_outcome(self) -> tuple[tuple[Fraction, ...], int]:
-        """Return v⁺, exact except for the certified root, and the rank 1."""
+        """Return v⁺, exact except for the root, and the rank 1."""
         impact = self.impact
         return impact.velocity(impact.passive_share()), 1
 

@@ -17,9 +17,7 @@ from verification.table import Table
 @pytest.fixture(scope="module")
 def measured() -> Table:
     seen: list[tuple[int, int]] = []
-    found = study.work_precision(
-        [(4, 3)], rounds=3, progress=lambda done, of: seen.append((done, of))
-    )
+    found = study.work_precision([(4, 3)], progress=lambda done, of: seen.append((done, of)))
     assert seen == [(k, 9) for k in range(10)]
     return found
 
