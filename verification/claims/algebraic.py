@@ -296,9 +296,7 @@ def _rows_apart(method: Callable[[Floats, Floats, Floats, float], Floats]) -> Me
         (mass, rows, velocity) = case.arrays
         everything = method(mass, rows, velocity, e)
         chosen = gram_cholesky(mass, rows[: case.rank], velocity, e)
-        return float(
-            np.sqrt(kinetic_energy(mass, everything - chosen) / kinetic_energy(mass, velocity))
-        )
+        return case.distance(everything, chosen)
 
     def bound(batch: Batch) -> float:  # both methods solve with M and with W
         condition = max(
@@ -441,8 +439,7 @@ def _distance(case: ImpactCase, change: Floats, e: float) -> float:
     there = resolve_impact(
         0.5 * (new_mass + new_mass.T), rows @ change, np.linalg.solve(change, velocity), e
     )
-    apart = here - change @ there.velocity
-    return float(np.sqrt(kinetic_energy(mass, apart) / kinetic_energy(mass, velocity)))
+    return case.distance(here, change @ there.velocity)
 
 
 def _sheared(case: ImpactCase, e: Fraction) -> tuple[Any, Any]:

@@ -23,6 +23,7 @@ from reference.complementarity.laws import (
     poisson,
 )
 from reference.complementarity.problem import ImpactProblem
+from reference.exact import relative_energy_gain
 from verification.check import Check, Study
 from verification.complementarity.families import random_mass_matrix
 from verification.finding import Part
@@ -56,15 +57,9 @@ def draw(rng: np.random.Generator, approaching: bool) -> ImpactCase:
     return ImpactCase(mass, rows, velocity, tangents=0.5 * rng.normal(size=(c, m, d)))
 
 
-def _form(impact: ImpactCase, v: Floats) -> float:
-    """Return vᵀ M v, twice the kinetic energy [J]."""
-    return float(v @ impact.mass_matrix @ v)
-
-
 def _gain(impact: ImpactCase, v_plus: Floats) -> float:
     """Return (KE⁺ − KE⁻)/KE⁻."""
-    before = _form(impact, impact.velocity)
-    return (_form(impact, v_plus) - before) / before
+    return relative_energy_gain(impact.mass_matrix, impact.velocity, v_plus)
 
 
 def with_friction(study: Study, case: tuple[float, float]) -> Row:
@@ -82,7 +77,7 @@ def with_friction(study: Study, case: tuple[float, float]) -> Row:
     for impact in impacts:
         mass, rows, v = impact.arrays
         ours = resolve_frictional_impact(*impact.given())
-        of_ours.append(2.0 * ours.energy_change / _form(impact, v))
+        of_ours.append(_gain(impact, ours.velocity))
         reduced += ours.friction_share < 1.0
         ncp, ccp = _counterparts(impact, e, mu)
         for gains, v_plus in ((of_ncp, ncp), (of_ccp, ccp)):
@@ -163,10 +158,8 @@ def with_unequal(study: Study, signs: str) -> Row:
         problem = ImpactProblem.from_impact(*impact.arrays, e)
         if len(set(e)) > 1:
             distances.append(impact.distance(ours.velocity, poisson(problem).velocity))
-        gains[k] = [
-            2.0 * ours.energy_change / _form(impact, impact.velocity),
-            *(_gain(impact, law(problem).velocity) for law in (newton_lcp, newton_equality)),
-        ]
+        others = [law(problem).velocity for law in (newton_lcp, newton_equality)]
+        gains[k] = [_gain(impact, v_plus) for v_plus in (ours.velocity, *others)]
     names = ("largest change of KE, IAPB", "Newton LCP", "equalities")
     return {
         "contacts": signs,
