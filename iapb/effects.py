@@ -74,7 +74,7 @@ class Question:
     @cached_property
     def frictions(self) -> list[float]:
         """Different values of mu among the pairs, ascending."""
-        found: list[float] = np.unique(self.system.frictions.by_pair(self.system.pairs)).tolist()
+        found: list[float] = np.unique(self.system.surfaces.by_pair(self.system.pairs)[1]).tolist()
         return found
 
     @cached_property

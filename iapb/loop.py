@@ -10,6 +10,7 @@ from iapb.contact.kernels.motion import STATUS_TEXT
 from iapb.contact.kernels.step import advance, contact_state
 from iapb.haptics.rendering import NO_COUPLING, couple, move_device, read_device, render
 from iapb.numerics.compiled import Entry, block, copy_into, kernel
+from iapb.numerics.copying import line_copier
 from iapb.numerics.linalg import load, store
 from iapb.numerics.schema import Quantity, blank, quantities
 from iapb.run import MADE_AFTERWARDS, ContactTable, ImpactTable, Run
@@ -98,44 +99,27 @@ def write_step(record, k, step, state, port):
     _write_tables(record, step, state)
 
 
+_copy_contact = line_copier(each for each in CONTACTS if each.name != "impulse")
+_copy_impact = line_copier(each for each in IMPACTS if each.name != "step")
+
+
 @kernel
 def _write_tables(record, step, state):
     line = record.contacts
     contacts = state.contacts
     m = record.used[1]
     for i in range(state.contact_count[0]):
-        line.body_a[m] = contacts.body_a[i]
-        line.body_b[m] = contacts.body_b[i]
-        moved = contacts.moved[i]
-        store(line.point, m, load(contacts.struck_point if moved else contacts.point, i))
-        store(line.normal, m, load(contacts.struck_normal if moved else contacts.normal, i))
-        store(line.friction_force, m, load(contacts.friction_force, i))
-        line.gap[m] = contacts.gap[i]
-        line.normal_velocity[m] = contacts.normal_velocity[i]
-        line.normal_force[m] = contacts.normal_force[i]
+        _copy_contact(line, m, contacts, i)
         line.impulse[m] = state.contact_impulse[i]
-        line.is_new[m] = contacts.is_new[i]
+        if contacts.moved[i]:
+            store(line.point, m, load(contacts.struck_point, i))
+            store(line.normal, m, load(contacts.struck_normal, i))
         m += 1
     record.used[1] = m
-    impact = record.impacts
-    log = state.impacts
     m = record.used[2]
-    for i in range(log.logged[0]):
-        impact.step[m] = step
-        impact.group[m] = log.group[i]
-        impact.rows[m] = log.rows[i]
-        impact.rank[m] = log.rank[i]
-        impact.scale[m] = log.scale[i]
-        impact.clamp[m] = log.clamp[i]
-        impact.energy_lost[m] = log.energy_lost[i]
-        impact.friction_share[m] = log.friction_share[i]
-        impact.approaching[m] = log.approaching[i]
-        impact.solved[m] = log.solved[i]
-        impact.time[m] = log.time[i]
-        copy_into(impact.q[m], log.q[i])
-        copy_into(impact.v_minus[m], log.v_minus[i])
-        copy_into(impact.v_plus[m], log.v_plus[i])
-        copy_into(impact.impulse[m], log.impulse[i])
+    for i in range(state.impacts.logged[0]):
+        _copy_impact(record.impacts, m, state.impacts, i)
+        record.impacts.step[m] = step
         m += 1
     record.used[2] = m
 

@@ -10,14 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from iapb.contact.finding import ContactFinder, Contacts
-from iapb.contact.geometry import ContactBuffer, contact_capacity
+from iapb.contact.geometry import contact_capacity
 from iapb.contact.kernels.broadphase import bounding_sphere, make_broad_phase
-from iapb.contact.kernels.impact import ImpactWork
-from iapb.contact.kernels.impact_friction import FrictionWork
-from iapb.contact.kernels.implicit import RestWork
 from iapb.contact.kernels.touch import MOST
-from iapb.contact.kernels.unilateral import PushWork, ShareWork
-from iapb.contact.kernels.world import Cut, State, Sweep, Switches, World
+from iapb.contact.kernels.unilateral import ShareWork
+from iapb.contact.kernels.world import State, Sweep, Switches, World
 from iapb.contact.laws import ContactLaw, ImpulseAugmented
 from iapb.contact.solids import Solid, solids_of
 from iapb.effects import EFFECT_NAMES, Effect, active_names, decide
@@ -59,7 +56,7 @@ class System:
     tool_dofs, tool_coordinates : (start, stop) of the tool in v and in q
     dt : float [s]; tangents : of a contact, 1 in the plane, 2 in space
     restitutions : (r,) the distinct values of e among the pairs of shapes that can touch, ascending
-    frictions : Frictions, of all pairs of shapes
+    surfaces : Surfaces, restitution and friction of all pairs of shapes
     start : (q, v)
     joint_damping, joint_friction : (d,) [N s/m, N m s/rad] and [N, N m]; stops : Stops, the limits of the joints
     """
@@ -78,8 +75,10 @@ class System:
         self.joint_damping = scene_parts.joint_damping_of(scene, self.mechanism)
         self.joint_friction = scene_parts.joint_friction_of(scene, self.mechanism)
         self.start = scene_parts.start_of(scene)
-        self.restitutions = scene_parts.restitutions_of(scene, self.pairs, stops)
-        self.frictions = scene_parts.frictions_of(scene, stops)
+        self.surfaces = scene_parts.surfaces_of(scene, stops)
+        of_pairs, _ = self.surfaces.by_pair(self.pairs)
+        of_stops = [scene.contact.restitution] * stops
+        self.restitutions: Floats = np.unique(np.append(of_pairs, of_stops))
         self.dt = 1.0 / scene.rate
         self.gravity = scene_parts.gravity_of(scene)
         self.tangents = 2 if isinstance(scene, SpatialScene) else 1
@@ -151,9 +150,6 @@ class System:
         )
         ranges = np.array(mechanism.tree_dofs, np.int64).reshape(-1, 2)
         stiffness, damping = contact.gains
-        restitution = contact.restitution
-        if len(self.restitutions) == 1:
-            restitution = self.restitutions[0]
         world: Any = block(
             World(
                 mechanism=mechanism.block,
@@ -175,11 +171,10 @@ class System:
                 damping=damping,
                 **{name: float(getattr(contact, name)) for name in _CONTACT_NUMBERS},
                 clamped=contact.penalty == "clamped",
-                friction_class=self.frictions.class_of_shape,
-                friction=self.frictions.table,
+                surface=self.surfaces.class_of_shape,
+                friction=self.surfaces.friction,
                 tangents=self.tangents,
-                restitution=float(restitution),
-                own_restitution=scene_parts.restitution_by_shape(scene, len(self.stops.bound)),
+                restitution=self.surfaces.restitution,
                 per_body_rows=contact.self_collision_rows == "per_body",
                 joint_damping=self.joint_damping,
                 joint_friction=self.joint_friction,
@@ -212,60 +207,46 @@ class System:
 
     def make_state(self) -> Any:
         """Return a new state at the scene's start."""
-        scene = self.scene
-        contact = self.scene.contact
         mechanism = self.mechanism
         c = self.capacity
         trees = len(mechanism.tree_dofs)
-        d = mechanism.nv
         tangents = self.tangents
-        largest = max((stop - start for start, stop in mechanism.tree_dofs), default=0)
-        per_body = contact.self_collision_rows == "per_body"
+        per_body = self.scene.contact.self_collision_rows == "per_body"
         rows = c * (2 if per_body else 1)  # (13)-(14): two each
         # per-body rows have no slip: no friction in impacts
-        sliding = scene.largest_friction > 0.0 and not per_body
-        soft = contact.forces == "implicit" or bool(self.joint_friction.any())
+        sliding = self.scene.largest_friction > 0.0 and not per_body
+        soft = self.scene.contact.forces == "implicit" or bool(self.joint_friction.any())
         uneven = len(self.restitutions) > 1
-        lengths = {"coordinate": mechanism.nq, "velocity": d, "tree": trees, "row": rows}
-        log = blank(IMPACTS[1:], lengths | {"impact": self.most_impacts})
+        lengths = {
+            "coordinate": mechanism.nq,
+            "velocity": mechanism.nv,
+            "width": 2 * max((stop - start for start, stop in mechanism.tree_dofs), default=0),
+            "tree": trees,
+            "body": len(mechanism.bodies),
+            "dof": mechanism.motions,
+            "placed": 2 * mechanism.motions,
+            "contact": c,
+            "row": rows,
+            "tangent": rows * tangents * sliding,
+            "direction": tangents,
+            "rest_row": c * (1 + tangents) * soft,
+            "impact": self.most_impacts,
+        }
+        log = blank(IMPACTS[1:], lengths)
         # where a law written in Python does not set it
         for name in ("scale", "clamp", "friction_share", "solved"):
             log[name][:] = 1
         log["approaching"][:] = -1
-        state = State(
-            **blank(quantities(State), lengths),
-            body=make_workspace(len(mechanism.bodies), mechanism.motions),
-            contacts=zeros_of(ContactBuffer, contact=c),
-            previous=zeros_of(ContactBuffer, contact=c),
-            scratch_contacts=zeros_of(ContactBuffer, contact=c),
-            arriving=zeros_of(ContactBuffer, contact=c * contact.at_touch),
-            cut=zeros_of(Cut, contact=c * contact.at_touch, **lengths),
-            work=zeros_of(ImpactWork, velocity=d, row=rows),
-            push_work=zeros_of(PushWork, velocity=d, row=rows),
+        state = zeros_of(State, **lengths)._replace(
             share_work=zeros_of(ShareWork, velocity=(rows + 1) * uneven, row=rows * uneven),
-            friction_work=zeros_of(
-                FrictionWork,
-                velocity=d * sliding,
-                row=rows * sliding,
-                tangent=rows * tangents * sliding,
-                direction=tangents,
-            ),
-            rest_work=zeros_of(
-                RestWork,
-                velocity=d * soft,
-                contact=c * soft,
-                row=c * (1 + tangents) * soft,
-                width=2 * largest,
-                tree=trees,
-            ),
             impacts={"logged": np.zeros(1, np.int64), **log},
         )
         state.q[:], state.v[:] = self.start
         state.mass_matrix[:] = mechanism.mass_matrix(state.q)
-        scene_parts.require_joints(scene)
+        scene_parts.require_joints(self.scene)
         _factored(state.mass_matrix, state.lower)
         state.group_of_tree[:] = state.island_of_tree[:] = np.arange(trees)
-        state.located_q[:] = np.nan
+        state.located_q[:] = state.body.placed_q[:] = np.nan
         state.h[:] = self.dt
         state.moving[:] = True
         state.cut.arriving[:] = state.cut.whole[:] = -1

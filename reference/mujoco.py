@@ -211,8 +211,7 @@ class MuJoCo:
         """List the pairs of shapes that can touch, each with its friction and restitution."""
         scene = system.scene
         pairs = system.pairs
-        frictions = system.frictions.by_pair(pairs)
-        restitutions = scene_parts.restitution_by_pair(scene, pairs)
+        restitutions, frictions = system.surfaces.by_pair(pairs)
         for (a, b), friction, restitution in zip(pairs, frictions, restitutions, strict=True):
             spec.add_pair(
                 geomname1=f"shape {a}",

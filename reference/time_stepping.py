@@ -24,7 +24,6 @@ from iapb.contact.laws import FRICTION, IMPACT_FRICTION, JOINTS, OWN_RESTITUTION
 from iapb.errors import ArgumentError
 from iapb.names import one_of
 from iapb.run import COLLIDING, FREE, RESTING
-from iapb.scene.mechanism import restitution_by_pair
 from iapb.system import System
 from reference import Floats, contact_rows
 from reference.free_motion import free_motion
@@ -193,17 +192,16 @@ class RigidConstraints:
         found: contact_rows.ContactRows,
         removed: Floats,
     ) -> _Solved:
-        classes, table = system.frictions
         values = system.restitutions
-        shapes = found.geometry[:2]
+        of_pairs, mu = system.surfaces.by_pair(np.stack(found.geometry[:2], axis=1))
         e: float | Floats = (
             float(values[0]) if len(values) else float(system.scene.contact.restitution)
         )
         differs = len(values) > 1  # among pairs that can touch: one e for each contact
         if differs:
-            e = restitution_by_pair(system.scene, np.stack(shapes, axis=1))
+            e = of_pairs
         removed = removed * np.equal(e, 0.0)
-        if self.friction == "none" or not table.any():
+        if self.friction == "none" or not system.surfaces.friction.any():
             # Contacts that touch together must act together, wherever in a step they do.
             contacts = StepContacts(found.jacobian, found.gap, e, removed)
             step = rigid_step(mass, v, force, dt, contacts, together=differs)
@@ -213,7 +211,6 @@ class RigidConstraints:
                 np.zeros((len(found.gap), 3)),
                 np.zeros_like(found.jacobian.T),
             )
-        mu = table[classes[shapes[0]], classes[shapes[1]]]
         bound = velocity_bounds(found.gap, found.gamma, e, dt, removed)
         tangents, rows = contact_rows.tangent_rows(system, q, found)
         v_free = v + dt * np.linalg.solve(mass, force)

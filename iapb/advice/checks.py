@@ -175,7 +175,7 @@ class Start:
     @cached_property
     def friction(self) -> Floats:
         """Coefficient of each contact."""
-        return self.system.frictions.by_pair(np.stack(self.found[:2], axis=1))
+        return self.system.surfaces.by_pair(np.stack(self.found[:2], axis=1))[1]
 
     @cached_property
     def thickness(self) -> Floats:

@@ -30,6 +30,11 @@ class Contacts(NamedTuple):
     gap: Floats  #: (c,) [m] negative is overlap
 
 
+class _Placements(NamedTuple):
+    rotation: Floats  # (n, 3, 3)
+    position: Floats  # (n, 3)
+
+
 class ContactFinder:
     """Finds the contacts of candidate pairs of shapes.
 
@@ -40,6 +45,8 @@ class ContactFinder:
         self._shapes = block(shapes)
         self._pairs = pairs
         self._detect = Entry(detect)
+        bodies = 1 + int(shapes.body.max(initial=-1))
+        self._placed = block(_Placements(np.empty((bodies, 3, 3)), np.empty((bodies, 3))))
         self._make_room(FIRST_ROOM)
 
     def _make_room(self, contacts: int) -> None:
@@ -56,8 +63,9 @@ class ContactFinder:
         """
         count = 0
         if len(self._pairs):
-            placed = map(np.ascontiguousarray, (rotations, positions))
-            given = self._shapes, self._pairs, *placed, float(margin)
+            self._placed.rotation[:] = rotations[: len(self._placed.rotation)]
+            self._placed.position[:] = positions[: len(self._placed.position)]
+            given = self._shapes, self._pairs, self._placed, float(margin)
             while (count := int(self._detect(*given, self._buffer))) < 0:
                 self._make_room(2 * len(self._found.gap))
         return Contacts(*(getattr(self._found, name)[:count].copy() for name in Contacts._fields))

@@ -74,27 +74,30 @@ class ContactBuffer(NamedTuple):
     point: Annotated[Floats, "contact 3"]
     normal: Annotated[Floats, "contact 3"]  # unit, from b into a
     gap: Annotated[Floats, "contact"]  # [m] negative = overlap
+    # found beside the geometry (`present_contacts`)
     is_new: Annotated[Booleans, "contact"]  # not a contact of the previous step
-    collides: Annotated[Booleans, "contact"]  # enters the impact of this step
     normal_velocity: Annotated[Floats, "contact"]  # [m/s] positive separates
     # [m/s] of a relative to b, orthogonal to the normal
     tangential_velocity: Annotated[Floats, "contact 3"]
+    idle: Annotated[Booleans, "contact"]  # takes no part in the present part of a step
+    moved: Annotated[Booleans, "contact"]  # it has moved on in the step since it struck
+    lift: Annotated[Floats, "contact"]  # [m] that it would bend off its support in this part
+    # what the next step needs to know
     normal_force: Annotated[Floats, "contact"]  # [N] on a along the normal
-    friction_force: Annotated[Floats, "contact 3"]  # [N] on a
-    mark: Annotated[States, "contact"]  # scratch of the clustering
     expected: Annotated[Floats, "contact"]  # [m] gap after the step if it were linear
+    span: Annotated[Floats, "contact"]  # [s] of the part of a step that `expected` is about
     sticks: Annotated[Booleans, "contact"]  # its points move together, by friction
     point_a: Annotated[Floats, "contact 3"]  # [m] the point in the axes of body a
     point_b: Annotated[Floats, "contact 3"]  # [m] the point in the axes of body b
     slid: Annotated[Floats, "contact 3"]  # [m] Δt J v of the step
     rolled: Annotated[Floats, "contact 3"]  # angle of a relative to b in the step, times the normal
     drift: Annotated[Floats, "contact 3"]  # [m] a relative to b since they stick
-    span: Annotated[Floats, "contact"]  # [s] of the part of a step that `expected` is about
-    moved: Annotated[Booleans, "contact"]  # it has moved on in the step since it struck
+    # the rest of the step
+    collides: Annotated[Booleans, "contact"]  # enters the impact of this step
+    friction_force: Annotated[Floats, "contact 3"]  # [N] on a
+    mark: Annotated[States, "contact"]  # scratch of the clustering
     struck_point: Annotated[Floats, "contact 3"]  # [m] where it struck, if it has moved on
     struck_normal: Annotated[Floats, "contact 3"]  # the normal then
-    lift: Annotated[Floats, "contact"]  # [m] that it would bend off its support in this part
-    idle: Annotated[Booleans, "contact"]  # takes no part in the present part of a step
 
 
 class Shape(NamedTuple):

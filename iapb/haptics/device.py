@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from iapb.errors import ArgumentError
-from iapb.haptics.rendering import NO_COUPLING, UNILATERAL, engage
+from iapb.haptics.rendering import NO_COUPLING, read_device
 from iapb.mechanics.bodies import finite_array
 from iapb.numerics.compiled import Entry
 from iapb.numerics.linalg import cholesky, solve_mass
@@ -158,25 +158,19 @@ class DeviceLink:
         self._world = world
         self._state = state
         self._port = port
-        self._engage = Entry(engage)
+        self._take = Entry(read_device)
         self._read()
 
     def exchange(self) -> None:
-        """Send ``port.device_force`` to the device, read it, and update the port as `move_device`
-        does.
+        """Send ``port.device_force`` to the device, and take its reading.
 
         A `SimulatedDevice` also gets the force of the simulated hand.
         """
-        world = self._world
-        state = self._state
         port = self._port
         if isinstance(self.device, SimulatedDevice):
             self.device.hand_force = port.device_hand_force.copy()
         self.device.apply(port.device_force.copy())
         self._read()
-        port.clock[0] += 1
-        if port.coupling == UNILATERAL:
-            self._engage(world, state, port)
 
     def release(self) -> None:
         """Set the force to zero, so that a real device does not keep its last force after the
@@ -185,6 +179,7 @@ class DeviceLink:
 
     def _read(self) -> None:
         reading = self.device.read()
-        for name, target in (("q", self._port.device_q), ("v", self._port.device_v)):
-            values = getattr(reading, name)
-            target[:] = finite_array(f"the device read {name}", values, target.shape)
+        port = self._port
+        q = finite_array("the device read q", reading.q, port.device_q.shape)
+        v = finite_array("the device read v", reading.v, port.device_v.shape)
+        self._take(self._world, self._state, port, q, v)

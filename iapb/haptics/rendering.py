@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
+from iapb.contact.kernels.contact_set import trees_of
 from iapb.contact.kernels.motion import LARGEST_SPEED
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.mechanics.kernels.arrays import MechanismArrays, Workspace
@@ -19,7 +20,7 @@ from iapb.mechanics.kernels.dynamics import bias, mass_matrix
 from iapb.mechanics.kernels.free_motion import RIGID, FreeMotion, move_simple_trees
 from iapb.mechanics.kernels.kinematics import add_point_force, forward_kinematics
 from iapb.numerics.compiled import copy_into, kernel
-from iapb.numerics.linalg import add, cholesky, dot, load, solve_mass, transform
+from iapb.numerics.linalg import cholesky, dot, load, placed, solve_mass
 from iapb.numerics.schema import Booleans, Floats, Integers
 from iapb.run import FREE
 
@@ -174,7 +175,7 @@ def press(mechanism, body, held, port, out):
     arm = port.hand_point
     force = (wrench[0], wrench[1], wrench[2])
     torque = (wrench[3], wrench[4], wrench[5])
-    point = add(load(body.position, held), transform(body.rotation, held, (arm[0], arm[1], arm[2])))
+    point = placed(body, held, (arm[0], arm[1], arm[2]))
     add_point_force(mechanism, body, held, point, force, out)
     k = mechanism.last_dof[held]
     while k >= 0:
@@ -295,16 +296,11 @@ def inside(world, state, port):
     count = detect(
         world.shapes,
         world.pairs,
-        state.body.rotation,
-        state.body.position,
+        state.body,
         0.0,
         state.scratch_contacts,
     )
-    for i in range(max(count, 0)):
-        a = state.scratch_contacts.body_a[i]
-        b = state.scratch_contacts.body_b[i]
-        if world.tree_of_body[a] == port.tool_tree or (
-            b >= 0 and world.tree_of_body[b] == port.tool_tree
-        ):
-            return True
-    return False
+    touches = False
+    for i in range(count):
+        touches = touches or port.tool_tree in trees_of(world, state.scratch_contacts, i)
+    return touches

@@ -59,6 +59,16 @@ def symmetric_entry(matrix, i, j):
 
 
 @kernel
+def row_times(matrix, i, v, unit=1.0):
+    """Return row i of the symmetric part of a matrix times unit · v, as a pair."""
+    high = low = 0.0
+    for j in range(v.shape[0]):
+        entry, rest = symmetric_entry(matrix, i, j)
+        high, low = add_product(high, low, entry, rest, unit * v[j])
+    return high, low
+
+
+@kernel
 def quadratic_forms(mass_matrix, v, change, v_unit=1.0, change_unit=1.0):
     """Return vᵀ M Δv and Δvᵀ M Δv of the symmetric part of M, each evaluated in double-double and
     rounded once.
@@ -68,12 +78,7 @@ def quadratic_forms(mass_matrix, v, change, v_unit=1.0, change_unit=1.0):
     d = v.shape[0]
     cross_hi = cross_lo = square_hi = square_lo = 0.0
     for i in range(d):
-        row_hi = row_lo = 0.0
-        for j in range(d):
-            entry_hi, entry_lo = symmetric_entry(mass_matrix, i, j)
-            row_hi, row_lo = add_product(
-                row_hi, row_lo, entry_hi, entry_lo, change_unit * change[j]
-            )
+        row_hi, row_lo = row_times(mass_matrix, i, change, change_unit)
         cross_hi, cross_lo = add_product(cross_hi, cross_lo, row_hi, row_lo, v_unit * v[i])
         square_hi, square_lo = add_product(
             square_hi, square_lo, row_hi, row_lo, change_unit * change[i]
@@ -111,13 +116,10 @@ def kinetic_energies(mass_matrix, v_minus, v_plus):
     The difference is formed before rounding, so it is accurate even if the two energies agree in
     all digits.
     """
-    d = v_minus.shape[0]
     before_hi = before_lo = change_hi = change_lo = 0.0
-    for i in range(d):
-        minus_hi = minus_lo = plus_hi = plus_lo = 0.0
-        for j in range(d):
-            minus_hi, minus_lo = add_product(minus_hi, minus_lo, mass_matrix[i, j], 0.0, v_minus[j])
-            plus_hi, plus_lo = add_product(plus_hi, plus_lo, mass_matrix[i, j], 0.0, v_plus[j])
+    for i in range(v_minus.shape[0]):
+        minus_hi, minus_lo = row_times(mass_matrix, i, v_minus)
+        plus_hi, plus_lo = row_times(mass_matrix, i, v_plus)
         before_hi, before_lo = add_product(before_hi, before_lo, minus_hi, minus_lo, v_minus[i])
         change_hi, change_lo = add_product(change_hi, change_lo, plus_hi, plus_lo, v_plus[i])
         change_hi, change_lo = add_product(change_hi, change_lo, -minus_hi, -minus_lo, v_minus[i])

@@ -37,6 +37,7 @@ _DECIDE = (
     "rehearsal.py",
     "compiled.py",
     "library.py",
+    "copying.py",
     "run.py",
     "joints.py",
     "arrays.py",

@@ -63,6 +63,12 @@ def dot(a, b):
 
 
 @kernel
+def norm(a):
+    """|a|."""
+    return math.sqrt(dot(a, a))
+
+
+@kernel
 def cross(a, b):
     """a x b."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
@@ -92,6 +98,12 @@ def transform_back(frames, i, a):
 
 
 @kernel
+def placed(w, i, a):
+    """Return where the point a, given in frame i of the placements w, is in the world; i = −1: a."""
+    return a if i < 0 else add(load(w.position, i), transform(w.rotation, i, a))
+
+
+@kernel
 def store_columns(frames, i, x, y, z):
     """frames[i] <- [x y z]."""
     frame = frames[i]
@@ -118,6 +130,12 @@ def dot_of(a, b):
     for k in range(b.shape[0]):
         total += a[k] * b[k]
     return total
+
+
+@kernel
+def norm_of(a):
+    """Return the Euclidean length of a vector."""
+    return math.sqrt(dot_of(a, a))
 
 
 @kernel

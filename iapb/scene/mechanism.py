@@ -32,9 +32,6 @@ from iapb.scene.parts import SMALLEST_POSITIVE
 
 Pairs = Indices
 
-# of a body without restitution of its own: larger than any, so that the other body's counts
-UNSTATED = 2.0
-
 
 def mechanism_of(scene: Scene) -> Mechanism:
     """Return the scene's bodies as a mechanism, in the scene's order; q concatenates their
@@ -351,61 +348,41 @@ def stops_of(scene: Scene, mechanism: Mechanism) -> Stops:
     )
 
 
-def restitution_by_shape(scene: Scene, stops: int = 0) -> Floats:
-    """Return the restitution (n,) that the body or wall of each shape gives; UNSTATED if it gives
-    none.
-
-    The shapes have the order of `shapes_of`. The stops of the joints follow; they give no
-    restitution.
-    """
-    given = [owner.restitution for _, owner, _ in _owned_shapes(scene)] + [None] * stops
-    return np.array([UNSTATED if e is None else e for e in given], np.float64)
-
-
-def restitution_by_pair(scene: Scene, pairs: Pairs) -> Floats:
-    """Return e of each candidate pair (k, 2) of shapes.
-
-    The smaller of the two given values counts. If only one of the two gives a value, that value
-    counts; if neither does, `contact.restitution` counts. So equal values are kept to the last bit,
-    and a soft body is soft against everything.
-    """
-    smaller = restitution_by_shape(scene)[pairs].min(axis=1)
-    return np.where(smaller > 1.0, scene.contact.restitution, smaller)
-
-
-def restitutions_of(scene: Scene, pairs: Pairs, stops: int) -> Floats:
-    """Return the distinct values of e among the candidate pairs (k, 2) of shapes and the joints'
-    stops, ascending."""
-    of_stops = [scene.contact.restitution] * stops
-    return np.unique(np.append(restitution_by_pair(scene, pairs), of_stops))
-
-
-class Frictions(NamedTuple):
-    """Coefficients of friction by class of shape: a table (k, k) for two classes, and the class
-    (n,) of each shape."""
+class Surfaces(NamedTuple):
+    """Restitution and friction by class of shape: tables (k, k) for two classes, and the class (n,)
+    of each shape."""
 
     class_of_shape: Integers
-    table: Floats
+    restitution: Floats
+    friction: Floats
 
-    def by_pair(self, pairs: Pairs) -> Floats:
-        """Return mu of each pair (k, 2) of shapes."""
-        return self.table[self.class_of_shape[pairs[:, 0]], self.class_of_shape[pairs[:, 1]]]
+    def by_pair(self, pairs: Pairs) -> tuple[Floats, Floats]:
+        """Return e and mu of each pair (k, 2) of shapes."""
+        classes = tuple(self.class_of_shape[np.transpose(pairs)])
+        return self.restitution[classes], self.friction[classes]
 
 
-def frictions_of(scene: Scene, stops: int) -> Frictions:
-    """Return mu of all pairs of shapes, in the order of `shapes_of`. The joints' stops follow, with
+def surfaces_of(scene: Scene, stops: int) -> Surfaces:
+    """Return e and mu of all pairs of shapes, in the order of `shapes_of`. The joints' stops follow,
+    with the scene's e and mu = 0.
+
+    Of two given values the smaller e counts, and the geometric mean of mu. If only one of the two
+    gives a value, that value counts; if neither does, that of `contact`. So equal values are kept
+    to the last bit, a soft body is soft against everything, and everything slides on a body with
     mu = 0.
-
-    It is the geometric mean of the two given values. If only one of the two gives a value, that
-    value counts; if neither does, `contact.friction` counts. So equal values are kept to the last
-    bit, and everything slides on a body with mu = 0.
     """
-    general = scene.contact.friction
-    given = [owner.friction for _, owner, _ in _owned_shapes(scene)]
-    values = list(dict.fromkeys(given))
-    table = np.zeros((len(values) + (stops > 0),) * 2)
-    for (i, first), (k, second) in itertools.product(enumerate(values), repeat=2):
-        own = [mu for mu in (first, second) if mu is not None] or [general]
-        table[i, k] = own[0] if own[0] == own[-1] else math.sqrt(own[0] * own[-1])
-    classes = [values.index(mu) for mu in given] + [len(values)] * stops
-    return Frictions(np.array(classes, np.int64), table)
+    contact = scene.contact
+    given = [(owner.restitution, owner.friction) for _, owner, _ in _owned_shapes(scene)]
+    given += [(contact.restitution, 0.0)] * stops
+    classes = list(dict.fromkeys(given))
+    restitution, friction = np.zeros((2, len(classes), len(classes)))
+    for (i, (e, mu)), (k, (other_e, other_mu)) in itertools.product(enumerate(classes), repeat=2):
+        restitution[i, k] = min(_given(contact.restitution, e, other_e))
+        own = _given(contact.friction, mu, other_mu)
+        friction[i, k] = own[0] if own[0] == own[-1] else math.sqrt(own[0] * own[-1])
+    of_shape = np.array([classes.index(one) for one in given], np.int64)
+    return Surfaces(of_shape, restitution, friction)
+
+
+def _given(general: float, *values: float | None) -> list[float]:
+    return [value for value in values if value is not None] or [general]

@@ -164,9 +164,9 @@ StandsAt = Callable[[Path, bool], tuple[int, int]]
 
 
 def mistakes_of(
-    failure: ValidationError, file: str, read: Any, place: StandsAt | None = None, inside: Path = ()
+    failure: ValidationError, file: str, read: Any, place: StandsAt | None = None
 ) -> list[Mistake]:
-    """Return pydantic's errors about the values at a path `inside` those `read` as mistakes.
+    """Return pydantic's errors about the values `read` as mistakes.
 
     `place` maps a path, and whether its key is meant, to line and column; without it they are 0.
     """
@@ -174,7 +174,7 @@ def mistakes_of(
     for error in failure.errors(include_url=False):
         path: list[str | int] = []
         here = read
-        for key in (*inside, *error["loc"]):
+        for key in error["loc"]:
             if isinstance(here, dict) and key not in here and key == here.get("kind"):
                 continue  # pydantic inserts the kind of a shape
             path.append(key)

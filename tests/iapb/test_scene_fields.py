@@ -42,7 +42,7 @@ def test_of_two_values_the_geometric_mean_counts(
         {"bodies.peg.friction": peg, "walls.floor.friction": floor, "contact.friction": general}
     )
     system = System(scene)
-    found = system.frictions.by_pair(system.pairs)  # right wall, floor
+    _, found = system.surfaces.by_pair(system.pairs)  # right wall, floor
     assert found == pytest.approx([general if peg is None else peg, expected], rel=1e-15)
 
 

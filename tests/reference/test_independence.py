@@ -36,7 +36,7 @@ READ = {
     "system": {
         "device_mechanism",
         "finder",
-        "frictions",
+        "surfaces",
         "gravity",
         "joint_damping",
         "mechanism",

@@ -22,7 +22,6 @@ from iapb.errors import IapbError
 from iapb.mechanics.mechanism import Mechanism
 from iapb.run import Run
 from iapb.scene import Scene, find_scene, load_scene
-from iapb.scene.mechanism import restitution_by_pair
 from iapb.system import System
 from reference.worlds import run_world
 from verification.impacts import Floats, ImpactCase
@@ -132,8 +131,7 @@ def _coefficients(
         away = np.linalg.norm(there.point - table.point[m], axis=1)
         nearest = np.argmin(np.where(same, away, np.inf))
         pair = np.array([[there.shape_a[nearest], there.shape_b[nearest]]])
-        e[k] = restitution_by_pair(system.scene, pair)[0]
-        mu[k] = system.frictions.by_pair(pair)[0]
+        e[k : k + 1], mu[k : k + 1] = system.surfaces.by_pair(pair)
     return e, mu
 
 

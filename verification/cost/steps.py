@@ -257,7 +257,7 @@ def _tested(simulation: Simulation) -> int:
     body = simulation.state.body
     if not world.broad_phase.used:
         return len(world.pairs)
-    return int(near_pairs(world.broad_phase, body.rotation, body.position, 0.0))
+    return int(near_pairs(world.broad_phase, body, 0.0))
 
 
 def body_targets(table: Table) -> Iterator[Part]:

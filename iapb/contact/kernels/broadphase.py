@@ -19,7 +19,7 @@ import numpy as np
 
 from iapb.contact.geometry import ENDLESS, HALF_SPACE, POLYGON, Shapes
 from iapb.numerics.compiled import kernel
-from iapb.numerics.linalg import add, dot, load, store, subtract, transform
+from iapb.numerics.linalg import dot, load, placed, store, subtract
 from iapb.numerics.schema import Floats, Indices, Integers, States, blank, quantities
 
 # Below this number of candidate pairs testing all is as fast: the narrow phase rejects distant
@@ -100,7 +100,7 @@ LARGEST_CELL = 2**40  # cell number of distant coordinates; int64 holds this cel
 
 
 @kernel
-def near_pairs(broad, R, p, margin):
+def near_pairs(broad, w, margin):
     """Write the pairs that may have gap <= margin to `broad.pairs`; return how many, -1 if they do
     not fit."""
     width = broad.cell_size + margin
@@ -108,8 +108,7 @@ def near_pairs(broad, R, p, margin):
     broad.first[:] = -1
     for m in range(broad.moving.shape[0]):
         i = broad.moving[m]
-        body = broad.body[i]
-        store(broad.center, i, add(load(p, body), transform(R, body, load(broad.local_center, i))))
+        store(broad.center, i, placed(w, broad.body[i], load(broad.local_center, i)))
         for axis in range(3):
             number = math.floor(broad.center[i, axis] / width)  # may be infinite or not a number
             broad.cell[m, axis] = int(number) if abs(number) < LARGEST_CELL else LARGEST_CELL

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from iapb.contact.kernels.contact_set import (
@@ -12,7 +10,6 @@ from iapb.contact.kernels.contact_set import (
     add_supports,
     find_islands,
     group_of_contact,
-    pair_restitution,
 )
 from iapb.contact.kernels.impact import factored_impact, rank_tolerance, whiten_impact
 from iapb.contact.kernels.impact_friction import add_impact_friction, sweep_impact
@@ -20,16 +17,16 @@ from iapb.contact.kernels.joint_stops import is_stop
 from iapb.contact.kernels.passive import passive_step, write_step
 from iapb.contact.kernels.row_basis import minimum_norm_impulses, orthonormal_basis
 from iapb.contact.kernels.rows import (
-    body_row,
     contact_velocities,
-    direction_row,
     friction_of,
+    restitution_of,
     tangent_of,
+    write_row,
 )
-from iapb.contact.kernels.shape_frames import copy_contact
+from iapb.contact.kernels.shape_frames import copy_geometry
 from iapb.contact.kernels.unilateral import poisson_impact
 from iapb.numerics.compiled import copy_into, kernel
-from iapb.numerics.linalg import dot_of, load
+from iapb.numerics.linalg import load, norm_of
 from iapb.run import COLLIDING
 
 # share of |u|, and of the largest impulse, above which a contact opens or pulls: far above rounding
@@ -74,12 +71,9 @@ def gather_rows(world, state, island, size):
         both = world.per_body_rows and contacts.body_b[i] >= 0 and not is_stop(contacts, i)
         for side in range(2 if both else 1):
             if both:
-                body = contacts.body_a[i] if side == 0 else contacts.body_b[i]
-                body_row(world.mechanism, state.body, body, contacts, i, state.row)
+                write_row(world, state, i, load(contacts.normal, i), 1.0 - side, 1.0 * side)
             else:
-                direction_row(
-                    world.mechanism, state.body, contacts, i, load(contacts.normal, i), state.row
-                )
+                write_row(world, state, i, load(contacts.normal, i), 1.0, -1.0)
             for k in range(size):
                 state.work.columns[k, count] = state.row[state.dofs[k]]
             state.rows[count] = i
@@ -188,7 +182,7 @@ def gather_tangents(world, state, size, count):
         f.coefficient[r] = friction_of(world, contacts, i)
         for a in range(tangents):
             tangent = tangent_of(load(contacts.normal, i), a, tangents)
-            direction_row(world.mechanism, state.body, contacts, i, tangent, state.row)
+            write_row(world, state, i, tangent, 1.0, -1.0)
             for k in range(size):
                 f.rows[r * tangents + a, k] = state.row[state.dofs[k]]
 
@@ -204,7 +198,7 @@ def keep_together(state, size, count):
     work = state.work
     least = state.friction_work.least
     kept = 0
-    opens = OPENS * math.sqrt(dot_of(work.u[:size], work.u[:size]))
+    opens = OPENS * norm_of(work.u[:size])
     for r in range(count):
         before = after = 0.0
         for k in range(size):
@@ -258,27 +252,18 @@ def resolve_rows(world, state, size, count):
     """Resolve by (20)-(21) or by the scene's extensions of them; return (rank, clamp, share of
     friction, solved)."""
     work = state.work
-    contacts = state.contacts
-    e = world.restitution
-    unequal = False
+    e = 1.0
+    largest = 0.0
     solved = True
     friction_share = 1.0
     tolerance = rank_tolerance(work.lower[:size, :size])
-    if (
-        world.switches.unequal_restitution
-        or world.switches.pushing
-        or world.switches.implicit_contact
-    ):
-        e = 1.0
-        largest = 0.0
-        unequal = world.switches.pushing or world.switches.implicit_contact and count > 1
-        for r in range(count):
-            i = state.rows[r]
-            own = pair_restitution(world, contacts, i)
-            state.row_restitution[r] = own
-            e = min(e, own)
-            largest = max(largest, own)
-        unequal = unequal or e < largest
+    for r in range(count):
+        own = restitution_of(world, state.contacts, state.rows[r])
+        state.row_restitution[r] = own
+        e = min(e, own)
+        largest = max(largest, own)
+    pushing = world.switches.pushing or world.switches.implicit_contact and count > 1
+    unequal = pushing or e < largest
     whiten_impact(size, count, unequal or world.switches.impact_friction, work)
     if (
         unequal
@@ -376,6 +361,17 @@ def resolve_collisions(world, state):
 
 
 @kernel
+def contacts_moving_now(world, state):
+    """Return copies of the contacts of the step, with their present velocities."""
+    now = state.scratch_contacts
+    count = state.contact_count[0]
+    for i in range(count):
+        copy_geometry(now, i, state.contacts, i)
+    contact_velocities(world, state, now, count)
+    return now
+
+
+@kernel
 def strike_again(world, state):
     """Find the contacts of colliding groups that impacts have made approach; return False if there
     are none.
@@ -384,17 +380,14 @@ def strike_again(world, state):
     step.
     """
     contacts = state.contacts
-    now = state.scratch_contacts
     count = state.contact_count[0]
     some = False
     if not world.switches.implicit_contact or world.switches.impulse_limit:
         return False
-    for i in range(count):
-        copy_contact(now, i, contacts, i)
-    contact_velocities(world.mechanism, state.body, state.v, now, count)
+    now = contacts_moving_now(world, state)
     for i in range(count):
         group = group_of_contact(world, contacts, i, state.group_of_tree)
-        e = pair_restitution(world, contacts, i)
+        e = restitution_of(world, contacts, i)
         if (
             state.state_of_tree[group] == COLLIDING
             and not contacts.idle[i]

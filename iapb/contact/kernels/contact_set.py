@@ -4,7 +4,8 @@ rows."""
 from __future__ import annotations
 
 from iapb.contact.kernels.joint_stops import is_stop
-from iapb.contact.kernels.shape_frames import copy_contact
+from iapb.contact.kernels.rows import restitution_of
+from iapb.contact.kernels.shape_frames import copy_geometry
 from iapb.numerics.compiled import kernel
 from iapb.numerics.linalg import dot, load, subtract
 from iapb.run import COLLIDING, FREE, RESTING
@@ -91,7 +92,7 @@ def cluster(world, contacts, count):
     for i in range(count):
         if contacts.mark[i] == _KEPT:
             if kept < i:  # nothing but the geometry is computed before clustering
-                copy_contact(contacts, kept, contacts, i)
+                copy_geometry(contacts, kept, contacts, i)
             kept += 1
     return kept
 
@@ -156,12 +157,22 @@ def contact_before(state, i, begin):
 
 
 @kernel
+def trees_of_bodies(world, a, b):
+    """Return the trees of two bodies; the world, b = −1, counts as the tree of a."""
+    tree = world.tree_of_body[a]
+    return tree, tree if b < 0 else world.tree_of_body[b]
+
+
+@kernel
+def trees_of(world, contacts, i):
+    """Return the trees of the two bodies of contact i; see `trees_of_bodies`."""
+    return trees_of_bodies(world, contacts.body_a[i], contacts.body_b[i])
+
+
+@kernel
 def join(world, contacts, i, group_of_tree):
     """Merge the groups of the two trees of contact i; the root of a group is its smallest tree."""
-    if contacts.body_b[i] < 0:
-        return
-    a = world.tree_of_body[contacts.body_a[i]]
-    b = world.tree_of_body[contacts.body_b[i]]
+    a, b = trees_of(world, contacts, i)
     while group_of_tree[a] != a:
         a = group_of_tree[a]
     while group_of_tree[b] != b:
@@ -261,14 +272,6 @@ def find_islands(world, state):
 
 
 @kernel
-def pair_restitution(world, contacts, i):
-    """Return e of contact i: the smaller value of its two shapes; the scene's if neither has one
-    (both are above 1)."""
-    e = min(world.own_restitution[contacts.shape_a[i]], world.own_restitution[contacts.shape_b[i]])
-    return world.restitution if e > 1.0 else e
-
-
-@kernel
 def add_supports(world, state):
     """Mark what strikes; of a colliding group, contacts that carry a load enter the impact, too.
 
@@ -283,7 +286,7 @@ def add_supports(world, state):
         if contacts.idle[i]:
             continue
         contacts.mark[i] = STRIKES if contacts.collides[i] else 0
-        bounces = bounces or contacts.collides[i] and pair_restitution(world, contacts, i) > 0.0
+        bounces = bounces or contacts.collides[i] and restitution_of(world, contacts, i) > 0.0
     for i in range(state.contact_count[0] if bounces else 0):
         group = group_of_contact(world, contacts, i, state.group_of_tree)
         if state.state_of_tree[group] != COLLIDING or contacts.collides[i] or contacts.idle[i]:

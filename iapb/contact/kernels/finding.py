@@ -16,9 +16,12 @@ from iapb.contact.kernels.joint_stops import add_stops
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.rows import contact_velocities
 from iapb.contact.kernels.seams import leave_out_seams
-from iapb.contact.kernels.shape_frames import copy_contact, copy_found
+from iapb.contact.kernels.shape_frames import (
+    copy_found,
+    copy_geometry,
+    copy_past,
+)
 from iapb.numerics.compiled import kernel
-from iapb.numerics.linalg import load, store
 
 # share of what a contact bent off its support in a step by which the next step may differ
 BENDS = 0.5
@@ -34,17 +37,7 @@ def find_contacts(world, state):
     before = state.previous
     # `mark_new` and friction compare with those of the last step
     for i in range(state.contact_count[0]):
-        copy_contact(before, i, now, i)
-        before.normal_force[i] = now.normal_force[i]
-        before.expected[i] = now.expected[i]
-        before.sticks[i] = now.sticks[i]
-        before.span[i] = now.span[i]
-        if world.switches.implicit_contact and world.switches.friction:
-            store(before.point_a, i, load(now.point_a, i))
-            store(before.point_b, i, load(now.point_b, i))
-            store(before.slid, i, load(now.slid, i))
-            store(before.rolled, i, load(now.rolled, i))
-            store(before.drift, i, load(now.drift, i))
+        copy_past(before, i, now, i)
     state.contact_count[1] = state.contact_count[0]
     if world.switches.touch and known_at_end(state):
         count = state.cut.arriving[0]
@@ -65,9 +58,9 @@ def known_at_end(state):
     """Return whether `arriving` holds the contacts of the present q and v."""
     known = state.cut.arriving[0] >= 0
     for i in range(state.q.shape[0]):
-        known = known and state.q[i] == state.cut.end_q[i]
+        known = known and state.q[i] == state.cut.end.q[i]
     for k in range(state.v.shape[0]):
-        known = known and state.v[k] == state.cut.end_v[k]
+        known = known and state.v[k] == state.cut.end.v[k]
     return known
 
 
@@ -80,7 +73,7 @@ def present_contacts(world, state, contacts, before, count_before):
     """
     count = detect_contacts(world, state, contacts, before, count_before)
     if count >= 0:
-        contact_velocities(world.mechanism, state.body, state.v, contacts, count)
+        contact_velocities(world, state, contacts, count)
         mark_new(contacts, count, before, count_before, world.coherence_distance, world.rigid)
         contacts.idle[:count] = False
         contacts.moved[:count] = False
@@ -94,8 +87,6 @@ def present_contacts(world, state, contacts, before, count_before):
 def detect_contacts(world, state, contacts, before, count_before):
     """Find, cluster and complete the contacts of the present configuration; return how many, -1:
     too many."""
-    R = state.body.rotation
-    p = state.body.position
     pairs = world.pairs
     # all corners of a face that touches, whatever its rounding, or the bend of a rigid contact
     margin = TOUCHING if world.switches.implicit_contact else 0.0
@@ -104,11 +95,11 @@ def detect_contacts(world, state, contacts, before, count_before):
         for i in range(count_before):
             margin = max(margin, may_lift(before, i))
     if world.broad_phase.used:
-        near = near_pairs(world.broad_phase, R, p, margin)
+        near = near_pairs(world.broad_phase, state.body, margin)
         if near < 0:
             return -1
         pairs = world.broad_phase.pairs[:near]
-    count = detect(world.shapes, pairs, R, p, margin, contacts)
+    count = detect(world.shapes, pairs, state.body, margin, contacts)
     if margin > CLOSE:
         count = leave_out_apart(contacts, count, before, count_before)
     else:
@@ -150,7 +141,7 @@ def leave_out_apart(contacts, count, before, count_before):
                 allowed = may_lift(before, k)
         if gap <= max(allowed, CLOSE):
             if kept < i:
-                copy_contact(contacts, kept, contacts, i)
+                copy_geometry(contacts, kept, contacts, i)
             contacts.gap[kept] = gap if allowed > CLOSE else min(gap, 0.0)
             kept += 1
     return kept

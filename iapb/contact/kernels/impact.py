@@ -9,7 +9,7 @@ from typing import Annotated, NamedTuple
 from iapb.contact.kernels.passive import UNIT, passive_step, write_step
 from iapb.contact.kernels.row_basis import orthonormal_basis
 from iapb.numerics.compiled import copy_into, kernel
-from iapb.numerics.double_double import add_product, symmetric_entry
+from iapb.numerics.double_double import add_product, row_times, symmetric_entry
 from iapb.numerics.linalg import (
     add_multiple,
     cholesky,
@@ -245,10 +245,7 @@ def refine_change(d, rank, work):
     lower = work.lower
     for _ in range(_PASSES):
         for i in range(d):
-            high = low = 0.0
-            for j in range(d):
-                entry, rest = symmetric_entry(work.mass, i, j)
-                high, low = add_product(high, low, entry, rest, work.v_change[j])
+            high, low = row_times(work.mass, i, work.v_change[:d])
             total = high + low
             for j in range(i):
                 total -= lower[i, j] * (deviation[j] + shifted[j])

@@ -26,7 +26,7 @@ from iapb.contact.kernels.row_basis import add_minimum_norm, minimum_norm_factor
 from iapb.contact.kernels.unilateral import push_only
 from iapb.numerics.compiled import copy_into, kernel
 from iapb.numerics.elementary import hypotenuse
-from iapb.numerics.linalg import add_multiple, dot_of, orthogonalize
+from iapb.numerics.linalg import add_multiple, dot_of, norm_of, orthogonalize
 from iapb.numerics.schema import Floats
 
 # share of a tangent's row: a smaller part outside the span of the normal rows is rounding
@@ -89,7 +89,7 @@ def add_impact_friction(d, count, rank, work, push, f, only_push, impulses):
         if orthogonalize(row, work.basis, rank, f.normal_part[j]) <= GONE * GONE * before:
             row[:] = 0.0
     # of the rounding of a tangential velocity [m/s]
-    scale = math.sqrt(largest) * math.sqrt(dot_of(u, u))
+    scale = math.sqrt(largest) * norm_of(u)
     met = settle_friction(count, rank, work, push, f, d, scale, only_push, impulses)
     share = share_within_cone(count, f)
     combine(count, f, d)
@@ -128,7 +128,7 @@ def share_within_cone(count, f):
     for i in range(count):
         own = f.p[i * size : (i + 1) * size]
         mu = f.coefficient[i]
-        length = math.sqrt(dot_of(own, own))
+        length = norm_of(own)
         excess = length - mu * max(f.wanted[i], 0.0)
         room = mu * max(f.without[i], 0.0)
         if excess > mu * CONE_ROUNDING * largest and length > 0.0:
@@ -248,7 +248,7 @@ def sweep_impact(d, count, work, f, impulses):
     for i in range(count):
         set_inertia(f, i, d)
         p_n[i] = impulses[i] * work.length[i]
-    speed = math.sqrt(dot_of(u, u))
+    speed = norm_of(u)
     fastest = math.inf
     for _ in range(IMPACT_SWEEPS):
         combine(count, f, d)
@@ -287,7 +287,7 @@ def _start(count, rank, work, push, f, d):
     change = work.change[:d]
     left = f.left[:d]
     size = f.velocity.shape[0]
-    length = math.sqrt(dot_of(change, change))
+    length = norm_of(change)
     for k in range(d):
         f.moved[k] = -change[k] / length if length > 0.0 else 0.0
     pushes = push_only(work.rows, count, f.moved[:d], f.without, left, push)
@@ -328,7 +328,7 @@ def _move_normals(count, rank, work, f, near):
             f.moved[j] = dot_of(work.columns[j], f.wanted[:count])
             for m in range(j + 1):
                 left[j] -= work.triangle[m, j] * f.moved[m]
-        defect = math.sqrt(dot_of(left, left))
+        defect = norm_of(left)
     else:
         f.wanted[:count] = 0.0
     add_minimum_norm(count, rank, left, f.wanted, work)
@@ -340,7 +340,7 @@ def _settle(count, rank, work, f, d, scale, pushes):
     """Iterate normal impulses, limits and p_t; return whether the last round changed less than MET
     times the scale."""
     size = f.velocity.shape[0]
-    speed = math.sqrt(dot_of(work.u[:d], work.u[:d]))
+    speed = norm_of(work.u[:d])
     still = STILL * scale
     moved = math.inf
     for done in range(ROUNDS):
@@ -351,7 +351,7 @@ def _settle(count, rank, work, f, d, scale, pushes):
                 f.wanted[i] = max(f.wanted[i], 0.0)
             own = f.p[i * size : (i + 1) * size]
             stride = 1.0
-            length = math.sqrt(dot_of(own, own))
+            length = norm_of(own)
             # Newton's step for a single sliding contact
             if length > 0.0 and length >= AT_LIMIT * f.limit[i]:
                 gain = f.sliding[i] * dot_of(f.response[i * size : (i + 1) * size], own) / length
@@ -364,7 +364,7 @@ def _settle(count, rank, work, f, d, scale, pushes):
         for i in range(count):  # an undamped limit that holds p_t would move it on
             own = f.p[i * size : (i + 1) * size]
             change = abs(f.change[i])
-            length = math.sqrt(dot_of(own, own))
+            length = norm_of(own)
             if length >= f.limit[i] - STRIDE * change:
                 moved = max(moved, f.inertia[i] * min(change, length))
         if speed > 0.0:
@@ -386,7 +386,7 @@ def _trim(count, rank, work, f, near):
         for i in range(count if turn < TRIMS else 0):
             own = f.p[i * size : (i + 1) * size]
             limit = f.sliding[i] * max(f.wanted[i], 0.0)
-            length = math.sqrt(dot_of(own, own))
+            length = norm_of(own)
             if length > limit:
                 within = False
                 for a in range(size):
@@ -466,11 +466,11 @@ def _slide(f, i, d):
     inertia = f.inertia[i]
     for a in range(size):
         velocity[a] = f.speed[first + a] + dot_of(f.rows[first + a], moved)
-    fastest = math.sqrt(dot_of(velocity, velocity))
+    fastest = norm_of(velocity)
     if not _stops(f, i, first):
         for a in range(size):
             velocity[a] = f.p[first + a] - velocity[a] / inertia
-        length = math.sqrt(dot_of(velocity, velocity))
+        length = norm_of(velocity)
         share = limit / length if length > limit else 1.0
         for a in range(size):
             velocity[a] *= share

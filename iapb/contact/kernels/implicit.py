@@ -30,7 +30,13 @@ from __future__ import annotations
 import math
 from typing import Annotated, NamedTuple
 
-from iapb.contact.kernels.contact_set import LEFT, TOUCHING, contact_before, group_of_contact
+from iapb.contact.kernels.contact_set import (
+    LEFT,
+    TOUCHING,
+    contact_before,
+    group_of_contact,
+    trees_of,
+)
 from iapb.contact.kernels.rows import friction_of, tangent_of, twist, write_pair_rows
 from iapb.numerics.compiled import kernel
 from iapb.numerics.linalg import (
@@ -40,10 +46,10 @@ from iapb.numerics.linalg import (
     dot,
     dot_of,
     load,
+    placed,
     scale,
     store,
     subtract,
-    transform,
     transform_back,
 )
 from iapb.numerics.schema import Floats, Integers
@@ -81,13 +87,13 @@ class RestWork(NamedTuple):
     at: Annotated[Integers, "contact 2"]  # first local coordinate of each of their two trees
     # number of coordinates of these; 0 = no tree, or the first one again
     size: Annotated[Integers, "contact 2"]
-    direction: Annotated[Floats, "row 3"]  # of each row: the normal, then the tangents
-    rows: Annotated[Floats, "row width"]  # rows of J: one half for each of the two trees
-    speed: Annotated[Floats, "row"]  # J v [m/s]
-    p: Annotated[Floats, "row"]  # impulses of the step [N s]
+    direction: Annotated[Floats, "rest_row 3"]  # of each row: the normal, then the tangents
+    rows: Annotated[Floats, "rest_row width"]  # rows of J: one half for each of the two trees
+    speed: Annotated[Floats, "rest_row"]  # J v [m/s]
+    p: Annotated[Floats, "rest_row"]  # impulses of the step [N s]
     limit: Annotated[Floats, "contact"]  # limits c = μ F_n Δt of friction [N s]
     # what a contact moved more than Δt J v in the step before, by Δt [m/s]
-    bend: Annotated[Floats, "row"]
+    bend: Annotated[Floats, "rest_row"]
     stiffness: Annotated[Floats, "1"]  # K of the group's contacts [N/m]
     first: Annotated[Integers, "tree"]  # first contact of each group, by its first tree, −1 = none
     next: Annotated[Integers, "contact"]  # contact of the same group that follows, −1 = none
@@ -98,7 +104,7 @@ class RestWork(NamedTuple):
     end: Annotated[Integers, "velocity"]  # and the one after the last
     # first nonzero column of each row of the Newton matrix
     envelope: Annotated[Integers, "velocity"]
-    change: Annotated[Floats, "row"]  # J Δv of a Newton step
+    change: Annotated[Floats, "rest_row"]  # J Δv of a Newton step
     v: Annotated[Floats, "velocity"]  # local velocities
     free: Annotated[Floats, "velocity"]  # v*
     dry: Annotated[Floats, "velocity"]  # limits Δt F of joint friction [N s, N m s]
@@ -296,14 +302,6 @@ def material_point(state, body, x):
 
 
 @kernel
-def placed(state, body, x):
-    """Return a point given in the axes of a body (−1: the world) in the world."""
-    if body < 0:
-        return x
-    return add(load(state.body.position, body), transform(state.body.rotation, body, x))
-
-
-@kernel
 def moved_aside(state, before):
     """Return how far the points that touched in the step before have moved apart in it [m].
 
@@ -315,7 +313,8 @@ def moved_aside(state, before):
     b = old.body_b[before]
     n = load(old.normal, before)
     apart = subtract(
-        placed(state, a, load(old.point_a, before)), placed(state, b, load(old.point_b, before))
+        placed(state.body, a, load(old.point_a, before)),
+        placed(state.body, b, load(old.point_b, before)),
     )
     return subtract(apart, scale(dot(apart, n) / 3.0, load(old.rolled, before)))
 
@@ -339,9 +338,8 @@ def follow_arc(world, state, before, i, row, s):
 def trees_of_contact(world, work, contacts, i, r):
     """Return the two trees of contact i, the second −1: none, or the same; write what row r needs
     of them to `work`."""
-    a = world.tree_of_body[contacts.body_a[i]]
-    b = contacts.body_b[i]
-    trees = (a, -1 if b < 0 or world.tree_of_body[b] == a else world.tree_of_body[b])
+    a, b = trees_of(world, contacts, i)
+    trees = (a, -1 if a == b else b)
     for side in range(2):
         t = trees[side]
         work.at[r, side] = work.offset[t] if t >= 0 else 0
@@ -755,8 +753,8 @@ def remember_points(world, state, r, s):
     n = load(contacts.normal, i)
     store(contacts.point_a, i, material_point(state, contacts.body_a[i], x))
     store(contacts.point_b, i, material_point(state, contacts.body_b[i], x))
-    _, _, omega_a = twist(world.mechanism, state.body, contacts.body_a[i], state.v)
-    _, _, omega_b = twist(world.mechanism, state.body, contacts.body_b[i], state.v)
+    _, _, omega_a = twist(world, state, contacts.body_a[i])
+    _, _, omega_b = twist(world, state, contacts.body_b[i])
     store(contacts.rolled, i, scale(state.h[0], cross(subtract(omega_a, omega_b), n)))
     slid = (0.0, 0.0, 0.0)
     for j in range(r * s, (r + 1) * s):

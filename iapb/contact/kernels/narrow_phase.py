@@ -28,11 +28,12 @@ from iapb.numerics.elementary import hypotenuse
 
 
 @kernel
-def detect(shapes, pairs, R, p, margin, buffer):
+def detect(shapes, pairs, w, margin, buffer):
     """Write the contacts of all pairs into `buffer`; return how many, or -1 if its capacity is
     exceeded.
 
-    shapes : Shapes; pairs : (k, 2); R (nb, 3, 3), p (nb, 3) : world placements of the bodies
+    shapes : Shapes; pairs : (k, 2)
+    w : world placements of the bodies, `rotation` (nb, 3, 3) and `position` (nb, 3)
     margin : float [m], contacts with gap <= margin are kept; 0 keeps overlaps and exact contact
         only
     buffer : ContactBuffer; only its geometric fields are written
@@ -44,17 +45,17 @@ def detect(shapes, pairs, R, p, margin, buffer):
         kind_a = shapes.kind[a]
         kind_b = shapes.kind[b]
         if kind_a == kind_b and kind_a in (CIRCLE, SPHERE):
-            count = balls(shapes, a, b, R, p, margin, buffer, count)
+            count = balls(shapes, a, b, w, margin, buffer, count)
         elif kind_a >= HALF_SPACE:
-            count = spatial_pair(shapes, a, b, R, p, margin, buffer, count)
+            count = spatial_pair(shapes, a, b, w, margin, buffer, count)
         elif kind_b == HALF_PLANE:
-            count = vertices_half_plane(shapes, a, b, R, p, margin, buffer, count)
+            count = vertices_half_plane(shapes, a, b, w, margin, buffer, count)
         elif kind_a == CIRCLE:
-            count = circle_polygon(shapes, a, b, True, R, p, margin, buffer, count)
+            count = circle_polygon(shapes, a, b, True, w, margin, buffer, count)
         elif kind_b == CIRCLE:
-            count = circle_polygon(shapes, b, a, False, R, p, margin, buffer, count)
+            count = circle_polygon(shapes, b, a, False, w, margin, buffer, count)
         else:
-            count = polygons(shapes, a, b, R, p, margin, buffer, count)
+            count = polygons(shapes, a, b, w, margin, buffer, count)
     return count
 
 
@@ -71,13 +72,13 @@ def following(shapes, shape, i):
 
 
 @kernel
-def vertices_half_plane(shapes, a, b, R, p, margin, buffer, count):
+def vertices_half_plane(shapes, a, b, w, margin, buffer, count):
     """Write one contact per vertex of polygon a, or one for circle a: gap = (vertex - point)·normal
     - radius."""
     x0, y0 = corner(shapes, b, 0)
     nx, ny = corner(shapes, b, 1)
     radius = shapes.radius[a]
-    frame = placement(shapes.body[a], R, p)
+    frame = placement(shapes.body[a], w)
     # the normal in a's frame
     mx = frame[0] * nx + frame[2] * ny
     my = frame[1] * nx + frame[3] * ny
@@ -105,13 +106,13 @@ def vertices_half_plane(shapes, a, b, R, p, margin, buffer, count):
 
 
 @kernel
-def circle_polygon(shapes, circle, polygon, circle_is_a, R, p, margin, buffer, count):
+def circle_polygon(shapes, circle, polygon, circle_is_a, w, margin, buffer, count):
     """Write the contact of a circle and a convex polygon, at the polygon's nearest edge or vertex.
 
     For a centre inside the polygon, the contact is at the nearest edge.
     """
     x, y = corner(shapes, circle, 0)
-    x, y = place(relative_frame(shapes, polygon, circle, R, p), x, y)
+    x, y = place(relative_frame(shapes, polygon, circle, w), x, y)
     best = -math.inf
     edge = 0
     nx = 0.0
@@ -144,13 +145,13 @@ def circle_polygon(shapes, circle, polygon, circle_is_a, R, p, margin, buffer, c
         nx = (x - ux) / best
         ny = (y - uy) / best
         feature = vertex_feature(2, end, 0)
-    nx, ny = turn_to_world(nx, ny, shapes.body[polygon], R)
+    nx, ny = turn_to_world(nx, ny, shapes.body[polygon], w)
     return ball_on_surface(
         shapes,
         circle,
         polygon,
         circle_is_a,
-        world_center(shapes, circle, R, p),
+        world_center(shapes, circle, w),
         (nx, ny, 0.0),
         best,
         feature,
@@ -177,33 +178,31 @@ ROUNDING_SHARE = 1e-12
 
 
 @kernel
-def polygons(shapes, a, b, R, p, margin, buffer, count):
+def polygons(shapes, a, b, w, margin, buffer, count):
     """Write the contacts (two at most) of convex polygons a and b; comments above describe the
     method."""
-    separation_a, edge_a = best_edge(shapes, a, b, R, p, margin)
+    separation_a, edge_a = best_edge(shapes, a, b, w, margin)
     if separation_a > margin:
         return count
-    separation_b, edge_b = best_edge(shapes, b, a, R, p, margin)
+    separation_b, edge_b = best_edge(shapes, b, a, w, margin)
     if separation_b > margin:
         return count
     if separation_b >= separation_a:
         return _against_reference(
-            shapes, b, a, edge_b, separation_b, True, R, p, margin, buffer, count
+            shapes, b, a, edge_b, separation_b, True, w, margin, buffer, count
         )
-    return _against_reference(
-        shapes, a, b, edge_a, separation_a, False, R, p, margin, buffer, count
-    )
+    return _against_reference(shapes, a, b, edge_a, separation_a, False, w, margin, buffer, count)
 
 
 @kernel
-def best_edge(shapes, onto, other, R, p, margin):
+def best_edge(shapes, onto, other, w, margin):
     """Return the largest separation over the edge normals of `onto`, and its edge; return early
     above the margin.
 
     separation of an edge = min over the vertices w of `other` of n·(w - v), n its outward normal, v
     its start
     """
-    frame = relative_frame(shapes, onto, other, R, p)
+    frame = relative_frame(shapes, onto, other, w)
     best = -math.inf
     edge = 0
     for i in range(shapes.count[onto]):
@@ -237,10 +236,10 @@ def edge_frame(shapes, shape, edge):
 
 
 @kernel
-def _against_reference(shapes, ref, other, edge, separation, ref_is_b, R, p, margin, buffer, count):
+def _against_reference(shapes, ref, other, edge, separation, ref_is_b, w, margin, buffer, count):
     """Write the contacts over the reference edge, or between two corners if the polygons are
     closest there."""
-    xx, xy, yx, yy, tx, ty = relative_frame(shapes, ref, other, R, p)
+    xx, xy, yx, yy, tx, ty = relative_frame(shapes, ref, other, w)
     ux, uy, nx, ny, length = edge_frame(shapes, ref, edge)
     mx = xx * nx + yx * ny
     my = xy * nx + yy * ny
@@ -263,7 +262,7 @@ def _against_reference(shapes, ref, other, edge, separation, ref_is_b, R, p, mar
     end_s, end_h = (s1, h1) if s1 >= 0.0 else (0.0, height_at(0.0, s0, h0, s1, h1))
     if missed or min(start_h, end_h) - separation > ROUNDING_SHARE * size:
         if separation > 0.0:
-            return _corners(shapes, ref, other, ref_is_b, R, p, margin, buffer, count)
+            return _corners(shapes, ref, other, ref_is_b, w, margin, buffer, count)
         # Overlapping: only rounding can put the deepest vertex outside the strip. Take it as it is.
         start_s, start_h = (s0, separation) if h0 < h1 else (s1, separation)
         end_h = math.inf
@@ -283,7 +282,7 @@ def _against_reference(shapes, ref, other, edge, separation, ref_is_b, R, p, mar
             x = ux - ny * s + 0.5 * h * nx
             y = uy + nx * s + 0.5 * h * ny
             count = _store_from(
-                shapes, ref, other, ref_is_b, feature, x, y, nx, ny, h, R, p, buffer, count
+                shapes, ref, other, ref_is_b, feature, x, y, nx, ny, h, w, buffer, count
             )
     return count
 
@@ -304,26 +303,26 @@ def height_at(s, s0, h0, s1, h1):
 
 
 @kernel
-def _store_from(shapes, ref, other, ref_is_b, feature, x, y, nx, ny, gap, R, p, buffer, count):
+def _store_from(shapes, ref, other, ref_is_b, feature, x, y, nx, ny, gap, w, buffer, count):
     """Store a contact given in the frame of shape `ref`, with its normal pointing out of it."""
     body = shapes.body[ref]
-    nx, ny = turn_to_world(nx, ny, body, R)
+    nx, ny = turn_to_world(nx, ny, body, w)
     if body >= 0:
-        x, y = place(placement(body, R, p), x, y)
+        x, y = place(placement(body, w), x, y)
     return store_contact(
         shapes, other, ref, ref_is_b, feature, (x, y, 0.0), (nx, ny, 0.0), gap, buffer, count
     )
 
 
 @kernel
-def _corners(shapes, ref, other, ref_is_b, R, p, margin, buffer, count):
+def _corners(shapes, ref, other, ref_is_b, w, margin, buffer, count):
     """Write one contact between the closest corners v of `ref` and w of `other`, two separated
     polygons.
 
     Pairs of corners are enough: if a corner is closest to the inside of an edge, the best axis is
     the normal of this edge and its separation is already the distance.
     """
-    frame = relative_frame(shapes, ref, other, R, p)
+    frame = relative_frame(shapes, ref, other, w)
     best = math.inf
     feature = 0
     vx = 0.0
@@ -357,8 +356,7 @@ def _corners(shapes, ref, other, ref_is_b, R, p, margin, buffer, count):
         (wx - vx) / distance,
         (wy - vy) / distance,
         distance,
-        R,
-        p,
+        w,
         buffer,
         count,
     )

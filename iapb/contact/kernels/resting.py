@@ -3,12 +3,10 @@ generalized forces."""
 
 from __future__ import annotations
 
-import math
-
 from iapb.contact.kernels.rows import add_body_row, friction_of
 from iapb.mechanics.kernels.kinematics import add_point_force
 from iapb.numerics.compiled import kernel
-from iapb.numerics.linalg import dot, load, scale, store
+from iapb.numerics.linalg import load, norm, scale, store
 
 
 @kernel
@@ -48,13 +46,13 @@ def resting_force(world, state, contacts, i):
     contacts.normal_force[i] = force
     x = load(contacts.point, i)
     n = load(contacts.normal, i)
-    add_body_row(world.mechanism, state.body, contacts.body_a[i], x, n, force, state.penalty_force)
-    add_body_row(world.mechanism, state.body, contacts.body_b[i], x, n, -force, state.penalty_force)
+    add_body_row(world, state, contacts.body_a[i], x, n, force, state.penalty_force)
+    add_body_row(world, state, contacts.body_b[i], x, n, -force, state.penalty_force)
     friction = friction_of(world, contacts, i)
     if friction == 0.0:
         return
     tangential = load(contacts.tangential_velocity, i)
-    speed = math.sqrt(dot(tangential, tangential))
+    speed = norm(tangential)
     friction_force = scale(
         friction_share(force, speed, friction, world.friction_velocity), tangential
     )

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from iapb.numerics.compiled import kernel
-from iapb.numerics.linalg import add_multiple, dot_of, orthogonalize
+from iapb.numerics.linalg import add_multiple, dot_of, norm_of, orthogonalize
 
 # A pivot is a residual row of at least this share of the longest one. A short residual has the
 # rounding ε / ‖r‖ in its direction. If only one direction is left, all rows tie, and without this
@@ -54,7 +54,7 @@ def _next_direction(columns, pivot, basis, rank):
         if turn > 0:
             for j in range(rank):
                 add_multiple(q, -dot_of(basis[j], q), basis[j])
-        left = math.sqrt(dot_of(q, q))
+        left = norm_of(q)
         if left > 0.0:
             for k in range(q.shape[0]):
                 q[k] /= left

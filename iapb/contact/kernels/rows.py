@@ -5,10 +5,8 @@ A row maps generalized velocity to normal velocity [m/s]; positive separates.
 
 from __future__ import annotations
 
-import math
-
 from iapb.numerics.compiled import kernel
-from iapb.numerics.linalg import add, cross, dot, load, scale, store, subtract
+from iapb.numerics.linalg import add, cross, dot, load, norm, scale, store, subtract
 
 # An entry n·j of a row (j: motion of the point per unit rate of one dof) is set to exact zero at
 # and below this share of the numbers it was computed from. Kinematics round by about 2e-16 per
@@ -20,21 +18,21 @@ ROW_NOISE = 1e-13
 
 
 @kernel
-def motion_and_size(m, w, k, x):
+def motion_and_size(world, state, k, x):
     """Return the motion of the world point x per unit rate of dof k, and the square of the numbers
     that it was computed from."""
-    a = load(w.axis, k)
+    m = world.mechanism
+    a = load(state.body.axis, k)
     if not m.dof_rotates[k]:
         return a, 1.0
-    o = load(w.position, m.dof_body[k])
+    o = load(state.body.position, m.dof_body[k])
     j = cross(a, subtract(x, o))
     return j, dot(j, j) + dot(x, x) + dot(o, o)
 
 
 @kernel
-def add_body_row(m, w, body, x, n, factor, out, shift=0):
-    """out[shift + k] += factor · nᵀJ of the body at the world point x, k < d; the static world (-1)
-    adds nothing.
+def add_body_row(world, state, body, x, n, factor, out):
+    """out (d,) += factor · nᵀJ of the body at the world point x; the static world (-1) adds nothing.
 
     With j the motion of x per unit rate of a dof, the entry n·j is left out if it is only rounding.
     For a translation the bound is |n·j| <= ROW_NOISE ‖j‖. For a rotation j = a × (x − o), and the
@@ -44,30 +42,26 @@ def add_body_row(m, w, body, x, n, factor, out, shift=0):
     """
     if body < 0:
         return
+    m = world.mechanism
     k = m.last_dof[body]
     while k >= 0:
-        motion, square = motion_and_size(m, w, k, x)
+        motion, square = motion_and_size(world, state, k, x)
         entry = dot(n, motion)
         if not entry * entry <= ROW_NOISE * ROW_NOISE * square:  # NaN is no noise
-            out[shift + m.dof_leader[k]] += m.dof_ratio[k] * factor * entry
+            out[m.dof_leader[k]] += m.dof_ratio[k] * factor * entry
         k = m.dof_parent[k]
 
 
 @kernel
-def body_row(m, w, body, contacts, i, out):
-    """out (d,) <- nᵀJ_b of one body alone at contact i, (13) and (14)."""
-    out[:] = 0.0
-    add_body_row(m, w, body, load(contacts.point, i), load(contacts.normal, i), 1.0, out)
-
-
-@kernel
-def direction_row(m, w, contacts, i, direction, out):
-    """out (d,) <- row of the relative velocity at contact i along a unit direction; the normal's is
-    (11) and (12)."""
-    out[:] = 0.0
+def write_row(world, state, i, direction, of_a, of_b):
+    """Write `state.row` (d,): the velocity of body a at contact i along a unit direction times of_a,
+    plus that of body b times of_b. 1 and −1 along the normal: (11) and (12); 1 and 0, 0 and 1: (13)
+    and (14)."""
+    contacts = state.contacts
     x = load(contacts.point, i)
-    add_body_row(m, w, contacts.body_a[i], x, direction, 1.0, out)
-    add_body_row(m, w, contacts.body_b[i], x, direction, -1.0, out)
+    state.row[:] = 0.0
+    add_body_row(world, state, contacts.body_a[i], x, direction, of_a, state.row)
+    add_body_row(world, state, contacts.body_b[i], x, direction, of_b, state.row)
 
 
 @kernel
@@ -75,7 +69,6 @@ def write_pair_rows(world, state, trees, i, directions, out):
     """Write the rows of contact i along s directions (s, 3) to out (s, 2 w): w entries for each of
     its two trees (−1 = none)."""
     m = world.mechanism
-    w = state.body
     half = out.shape[1] // 2
     x = load(state.contacts.point, i)
     factor = 1.0
@@ -86,7 +79,7 @@ def write_pair_rows(world, state, trees, i, directions, out):
             shift = (half if tree == trees[1] else 0) - world.tree_start[tree]
             k = m.last_dof[body]
             while k >= 0:
-                motion, square = motion_and_size(m, w, k, x)
+                motion, square = motion_and_size(world, state, k, x)
                 for j in range(directions.shape[0]):
                     entry = dot(load(directions, j), motion)
                     if not entry * entry <= ROW_NOISE * ROW_NOISE * square:
@@ -97,10 +90,20 @@ def write_pair_rows(world, state, trees, i, directions, out):
 
 @kernel
 def friction_of(world, contacts, i):
-    """Return μ of contact i, given by the friction classes of its two shapes."""
-    return world.friction[
-        world.friction_class[contacts.shape_a[i]], world.friction_class[contacts.shape_b[i]]
-    ]
+    """Return μ of contact i."""
+    return of_surfaces(world, contacts, i, world.friction)
+
+
+@kernel
+def of_surfaces(world, contacts, i, table):
+    """Return the entry of a table for the two shapes of contact i."""
+    return table[world.surface[contacts.shape_a[i]], world.surface[contacts.shape_b[i]]]
+
+
+@kernel
+def restitution_of(world, contacts, i):
+    """Return e of contact i."""
+    return of_surfaces(world, contacts, i, world.restitution)
 
 
 @kernel
@@ -118,12 +121,12 @@ def tangent_of(n, which, tangents):
         first = (n[2], 0.0, -n[0])
     else:
         first = (-n[1], n[0], 0.0)
-    first = scale(1.0 / math.sqrt(dot(first, first)), first)
+    first = scale(1.0 / norm(first), first)
     return first if which == 0 else cross(n, first)
 
 
 @kernel
-def twist(m, w, body, v):
+def twist(world, state, body):
     """Return the origin p of a body, the velocity u of p and the angular velocity ω; zeros for the
     static world.
 
@@ -132,10 +135,12 @@ def twist(m, w, body, v):
     p = u = omega = (0.0, 0.0, 0.0)
     if body < 0:
         return p, u, omega
+    m = world.mechanism
+    w = state.body
     p = load(w.position, body)
     k = m.last_dof[body]
     while k >= 0:
-        rate = scale(m.dof_ratio[k] * v[m.dof_leader[k]], load(w.axis, k))
+        rate = scale(m.dof_ratio[k] * state.v[m.dof_leader[k]], load(w.axis, k))
         if m.dof_rotates[k]:
             omega = add(omega, rate)
             rate = cross(rate, subtract(p, load(w.position, m.dof_body[k])))
@@ -145,26 +150,23 @@ def twist(m, w, body, v):
 
 
 @kernel
-def contact_velocities(m, w, v, contacts, count):
+def contact_velocities(world, state, contacts, count):
     """Write normal_velocity n·(v_a − v_b) and tangential_velocity (the rest of v_a − v_b) of each
     contact."""
-    points = contacts.point
-    normals = contacts.normal
-    tangentials = contacts.tangential_velocity
     a = b = -1  # bodies whose twists are computed already: contacts of one pair follow each other
-    p_a, u_a, omega_a = p_b, u_b, omega_b = twist(m, w, -1, v)
+    p_a, u_a, omega_a = p_b, u_b, omega_b = twist(world, state, -1)
     for i in range(count):
         if contacts.body_a[i] != a:
             a = contacts.body_a[i]
-            p_a, u_a, omega_a = twist(m, w, a, v)
+            p_a, u_a, omega_a = twist(world, state, a)
         if contacts.body_b[i] != b:
             b = contacts.body_b[i]
-            p_b, u_b, omega_b = twist(m, w, b, v)
-        x = load(points, i)
-        n = load(normals, i)
+            p_b, u_b, omega_b = twist(world, state, b)
+        x = load(contacts.point, i)
+        n = load(contacts.normal, i)
         relative = add(u_a, cross(omega_a, subtract(x, p_a)))
         if b >= 0:
             relative = subtract(relative, add(u_b, cross(omega_b, subtract(x, p_b))))
         normal_velocity = dot(n, relative)
         contacts.normal_velocity[i] = normal_velocity
-        store(tangentials, i, subtract(relative, scale(normal_velocity, n)))
+        store(contacts.tangential_velocity, i, subtract(relative, scale(normal_velocity, n)))

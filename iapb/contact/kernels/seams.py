@@ -102,8 +102,7 @@ def is_apart(world, state, a, b):
                 detect(
                     world.shapes,
                     world.pairs[k : k + 1],
-                    state.body.rotation,
-                    state.body.position,
+                    state.body,
                     -_OVERLAPS,
                     state.scratch_contacts,
                 )

@@ -3,12 +3,12 @@ storing a contact."""
 
 from __future__ import annotations
 
-import math
-
-from iapb.contact.geometry import CIRCLE, HALF_SPACE
+from iapb.contact.geometry import CIRCLE, HALF_SPACE, ContactBuffer
 from iapb.numerics.compiled import kernel
+from iapb.numerics.copying import line_copier
 from iapb.numerics.elementary import hypotenuse
-from iapb.numerics.linalg import add, column, dot, load, scale, store, subtract, transform
+from iapb.numerics.linalg import add, column, load, norm, placed, scale, store, subtract, transform
+from iapb.numerics.schema import quantities
 
 
 @kernel
@@ -22,18 +22,25 @@ def vertex_feature(kind, vertex, edge):
 
 
 @kernel
-def placement(body, R, p):
+def placement(body, w):
     """Return the planar part of a body's placement: R row by row, then p; body < 0 is the world."""
     if body < 0:
         return 1.0, 0.0, 0.0, 1.0, 0.0, 0.0
-    return R[body, 0, 0], R[body, 0, 1], R[body, 1, 0], R[body, 1, 1], p[body, 0], p[body, 1]
+    return (
+        w.rotation[body, 0, 0],
+        w.rotation[body, 0, 1],
+        w.rotation[body, 1, 0],
+        w.rotation[body, 1, 1],
+        w.position[body, 0],
+        w.position[body, 1],
+    )
 
 
 @kernel
-def relative_frame(shapes, onto, other, R, p):
+def relative_frame(shapes, onto, other, w):
     """Return the planar placement (see `placement`) of the body of `other` in that of `onto`."""
-    ixx, ixy, iyx, iyy, ix, iy = placement(shapes.body[onto], R, p)
-    jxx, jxy, jyx, jyy, jx, jy = placement(shapes.body[other], R, p)
+    ixx, ixy, iyx, iyy, ix, iy = placement(shapes.body[onto], w)
+    jxx, jxy, jyx, jyy, jx, jy = placement(shapes.body[other], w)
     dx = jx - ix
     dy = jy - iy
     return (
@@ -53,54 +60,54 @@ def place(frame, x, y):
 
 
 @kernel
-def turn_to_world(x, y, body, R):
+def turn_to_world(x, y, body, w):
     """Return the world components of a direction of the plane given in a body's frame."""
     if body < 0:
         return x, y
-    return R[body, 0, 0] * x + R[body, 0, 1] * y, R[body, 1, 0] * x + R[body, 1, 1] * y
+    return w.rotation[body, 0, 0] * x + w.rotation[body, 0, 1] * y, w.rotation[
+        body, 1, 0
+    ] * x + w.rotation[body, 1, 1] * y
 
 
 @kernel
-def world_center(shapes, shape, R, p):
+def world_center(shapes, shape, w):
     """Return, in the world, the centre of a circle, sphere or box, or the point of a half-space."""
-    body = shapes.body[shape]
-    local = load(shapes.center, shape)
-    return local if body < 0 else add(load(p, body), transform(R, body, local))
+    return placed(w, shapes.body[shape], load(shapes.center, shape))
 
 
 @kernel
-def world_axis(shapes, shape, k, R):
+def world_axis(shapes, shape, k, w):
     """Return axis k of a shape in the world; axis 2 of a half-space is its outward normal."""
     body = shapes.body[shape]
     local = column(shapes.axes, shape, k)
-    return local if body < 0 else transform(R, body, local)
+    return local if body < 0 else transform(w.rotation, body, local)
 
 
 @kernel
-def world_axes(shapes, shape, R):
+def world_axes(shapes, shape, w):
     """Return the three axes of a shape in the world."""
     return (
-        world_axis(shapes, shape, 0, R),
-        world_axis(shapes, shape, 1, R),
-        world_axis(shapes, shape, 2, R),
+        world_axis(shapes, shape, 0, w),
+        world_axis(shapes, shape, 1, w),
+        world_axis(shapes, shape, 2, w),
     )
 
 
 @kernel
-def balls(shapes, a, b, R, p, margin, buffer, count):
+def balls(shapes, a, b, w, margin, buffer, count):
     """Write the contact of two circles or two spheres: gap = distance of centres - both radii.
 
     Coincident centres have no line for the normal. It is then along the last axis, antisymmetric in
     the two shapes.
     """
-    center = world_center(shapes, b, R, p)
-    apart = subtract(world_center(shapes, a, R, p), center)
+    center = world_center(shapes, b, w)
+    apart = subtract(world_center(shapes, a, w), center)
     radius_a = shapes.radius[a]
     radius_b = shapes.radius[b]
     flat = shapes.kind[a] == CIRCLE
     if max(abs(apart[0]), abs(apart[1])) > radius_a + radius_b + margin:
         return count
-    distance = hypotenuse(apart[0], apart[1]) if flat else math.sqrt(dot(apart, apart))
+    distance = hypotenuse(apart[0], apart[1]) if flat else norm(apart)
     gap = distance - (radius_a + radius_b)
     if gap > margin:
         return count
@@ -145,48 +152,15 @@ def store_contact(shapes, one, other, one_is_a, feature, point, normal, gap, buf
     return count + 1
 
 
-@kernel
-def copy_contact(to, i, contacts, j):
-    """Copy the geometry of contact j to row i of the buffer `to`."""
-    to.shape_a[i] = contacts.shape_a[j]
-    to.shape_b[i] = contacts.shape_b[j]
-    to.feature[i] = contacts.feature[j]
-    to.body_a[i] = contacts.body_a[j]
-    to.body_b[i] = contacts.body_b[j]
-    to.gap[i] = contacts.gap[j]
-    store(to.point, i, load(contacts.point, j))
-    store(to.normal, i, load(contacts.normal, j))
+_FIELDS = quantities(ContactBuffer)
+copy_contact = line_copier(_FIELDS)
+copy_geometry = line_copier(_FIELDS[:8])
+copy_found = line_copier(_FIELDS[:14])
+copy_past = line_copier(_FIELDS[:8] + _FIELDS[14:23])  # what the next step needs to know
 
 
 @kernel
-def copy_found(to, i, contacts, j):
-    """Copy contact j, its velocities and whether it is new to row i of the buffer `to`."""
-    copy_contact(to, i, contacts, j)
-    to.is_new[i] = contacts.is_new[j]
-    to.idle[i] = contacts.idle[j]
-    to.moved[i] = False
-    to.normal_velocity[i] = contacts.normal_velocity[j]
-    to.lift[i] = 0.0
-    store(to.tangential_velocity, i, load(contacts.tangential_velocity, j))
-
-
-@kernel
-def copy_all(to, i, contacts, j):
-    """Copy contact j with all that a step computes of it to row i of the buffer `to`."""
-    copy_found(to, i, contacts, j)
-    to.collides[i] = contacts.collides[j]
-    to.mark[i] = contacts.mark[j]
-    to.sticks[i] = contacts.sticks[j]
-    to.normal_force[i] = contacts.normal_force[j]
-    to.expected[i] = contacts.expected[j]
-    to.span[i] = contacts.span[j]
-    to.lift[i] = contacts.lift[j]
-    to.moved[i] = contacts.moved[j]
-    store(to.struck_point, i, load(contacts.struck_point, j))
-    store(to.struck_normal, i, load(contacts.struck_normal, j))
-    store(to.friction_force, i, load(contacts.friction_force, j))
-    store(to.point_a, i, load(contacts.point_a, j))
-    store(to.point_b, i, load(contacts.point_b, j))
-    store(to.slid, i, load(contacts.slid, j))
-    store(to.rolled, i, load(contacts.rolled, j))
-    store(to.drift, i, load(contacts.drift, j))
+def copy_contacts(to, contacts, count):
+    """Copy the first `count` contacts to the buffer `to`."""
+    for i in range(count):
+        copy_contact(to, i, contacts, i)

@@ -12,7 +12,7 @@ import math
 from iapb.contact.geometry import BOX, BOX_PAIR_CONTACTS, HALF_SPACE, SPHERE
 from iapb.contact.kernels.shape_frames import (
     ball_on_surface,
-    copy_contact,
+    copy_geometry,
     store_contact,
     vertex_feature,
     world_axes,
@@ -20,30 +20,30 @@ from iapb.contact.kernels.shape_frames import (
     world_center,
 )
 from iapb.numerics.compiled import kernel
-from iapb.numerics.linalg import add, cross, dot, load, scale, subtract
+from iapb.numerics.linalg import add, cross, dot, load, norm, scale, subtract
 
 
 @kernel
-def spatial_pair(shapes, a, b, R, p, margin, buffer, count):
+def spatial_pair(shapes, a, b, w, margin, buffer, count):
     """Write the contacts of two spatial shapes, not both spheres; a half-space is always b."""
     if shapes.kind[b] == HALF_SPACE:
-        return corners_half_space(shapes, a, b, R, p, margin, buffer, count)
+        return corners_half_space(shapes, a, b, w, margin, buffer, count)
     if shapes.kind[a] == SPHERE:
-        return sphere_box(shapes, a, b, True, R, p, margin, buffer, count)
+        return sphere_box(shapes, a, b, True, w, margin, buffer, count)
     if shapes.kind[b] == SPHERE:
-        return sphere_box(shapes, b, a, False, R, p, margin, buffer, count)
-    return boxes(shapes, a, b, R, p, margin, buffer, count)
+        return sphere_box(shapes, b, a, False, w, margin, buffer, count)
+    return boxes(shapes, a, b, w, margin, buffer, count)
 
 
 @kernel
-def corners_half_space(shapes, a, b, R, p, margin, buffer, count):
+def corners_half_space(shapes, a, b, w, margin, buffer, count):
     """Write one contact per corner of box a, or one for sphere a: gap = (corner - point)·normal -
     radius."""
-    normal = world_axis(shapes, b, 2, R)
-    center = world_center(shapes, a, R, p)
+    normal = world_axis(shapes, b, 2, w)
+    center = world_center(shapes, a, w)
     radius = shapes.radius[a]
-    height = dot(subtract(center, world_center(shapes, b, R, p)), normal)
-    x, y, z = world_axes(shapes, a, R)
+    height = dot(subtract(center, world_center(shapes, b, w)), normal)
+    x, y, z = world_axes(shapes, a, w)
     x = scale(shapes.half_size[a, 0], x)
     y = scale(shapes.half_size[a, 1], y)
     z = scale(shapes.half_size[a, 2], z)
@@ -65,16 +65,16 @@ def corners_half_space(shapes, a, b, R, p, margin, buffer, count):
 
 
 @kernel
-def sphere_box(shapes, sphere, box, sphere_is_a, R, p, margin, buffer, count):
+def sphere_box(shapes, sphere, box, sphere_is_a, w, margin, buffer, count):
     """Write the contact of a sphere and a box, at the box's nearest point, or nearest face for a
     centre inside."""
-    center = world_center(shapes, sphere, R, p)
-    apart = subtract(center, world_center(shapes, box, R, p))
+    center = world_center(shapes, sphere, w)
+    apart = subtract(center, world_center(shapes, box, w))
     half = load(shapes.half_size, box)
     reach = half[0] + half[1] + half[2] + shapes.radius[sphere] + margin
     if dot(apart, apart) > reach * reach:
         return count
-    axes = world_axes(shapes, box, R)
+    axes = world_axes(shapes, box, w)
     region = 0
     outward = (0.0, 0.0, 0.0)
     exit_distance = math.inf
@@ -91,7 +91,7 @@ def sphere_box(shapes, sphere, box, sphere_is_a, R, p, margin, buffer, count):
             exit_distance = -beyond
             exit_region = (1 if x >= 0.0 else 2) * 3**k
             exit_normal = scale(sign, axes[k])
-    distance = math.sqrt(dot(outward, outward))
+    distance = norm(outward)
     if distance == 0.0:  # the centre is inside
         distance = -exit_distance
         region = exit_region
@@ -142,20 +142,20 @@ FACES_COSINE = 0.9999
 
 
 @kernel
-def placed_box(shapes, shape, R, p):
+def placed_box(shapes, shape, w):
     """Return centre, axes and half sizes of a box in the world."""
     return (
-        world_center(shapes, shape, R, p),
-        world_axes(shapes, shape, R),
+        world_center(shapes, shape, w),
+        world_axes(shapes, shape, w),
         load(shapes.half_size, shape),
     )
 
 
 @kernel
-def boxes(shapes, a, b, R, p, margin, buffer, count):
+def boxes(shapes, a, b, w, margin, buffer, count):
     """Write the contacts (four at most) of two boxes."""
-    A = placed_box(shapes, a, R, p)
-    B = placed_box(shapes, b, R, p)
+    A = placed_box(shapes, a, w)
+    B = placed_box(shapes, b, w)
     apart = subtract(A[0], B[0])
     half_a = A[2]
     half_b = B[2]
@@ -226,7 +226,7 @@ def _best_edges(apart, A, B):
     for i in range(3):
         for j in range(3):
             n = cross(A[1][i], B[1][j])
-            length = math.sqrt(dot(n, n))
+            length = norm(n)
             if length < PARALLEL_SINE:
                 continue
             n = scale(1.0 / length, n)
@@ -258,7 +258,7 @@ def _edges(shapes, a, b, i, j, gap, A, B, buffer, count):
     along = A[1][i]
     across = B[1][j]
     n = cross(along, across)
-    n = scale(1.0 / math.sqrt(dot(n, n)), n)
+    n = scale(1.0 / norm(n), n)
     if dot(n, subtract(A[0], B[0])) < 0.0:
         n = scale(-1.0, n)
     x, edge_a = _edge_middle(A, i, scale(-1.0, n))
@@ -440,6 +440,6 @@ def keep_widest(buffer, start, count, m):
 @kernel
 def _swap(buffer, i, j, spare):
     """Exchange the geometry of rows i and j, with a row to spare."""
-    copy_contact(buffer, spare, buffer, i)
-    copy_contact(buffer, i, buffer, j)
-    copy_contact(buffer, j, buffer, spare)
+    copy_geometry(buffer, spare, buffer, i)
+    copy_geometry(buffer, i, buffer, j)
+    copy_geometry(buffer, j, buffer, spare)

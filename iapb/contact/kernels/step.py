@@ -32,7 +32,7 @@ def advance(world, state, applied):
     if not world.switches.touch:
         return move(world, state, applied)
     let_go(world, state)
-    copy_into(state.cut.start.q, state.q)
+    copy_into(state.cut.start_q, state.q)
     status = move(world, state, applied)
     return cut_at_touch(world, state, applied) if status == OK else status
 

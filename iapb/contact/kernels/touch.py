@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import math
 
-from iapb.contact.kernels.collide import resolve_collisions
+from iapb.contact.kernels.collide import contacts_moving_now, resolve_collisions
 from iapb.contact.kernels.contact_set import (
     CLOSE,
     LEFT,
@@ -32,22 +32,37 @@ from iapb.contact.kernels.contact_set import (
     group_of_contact,
     mark_new,
     same_name,
+    trees_of,
+    trees_of_bodies,
 )
 from iapb.contact.kernels.finding import present_contacts
 from iapb.contact.kernels.joint_stops import add_stops, is_stop
 from iapb.contact.kernels.motion import NOT_POSITIVE_DEFINITE, OK, TOO_MANY_CONTACTS, locate, move
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.rows import contact_velocities, twist
-from iapb.contact.kernels.shape_frames import copy_all, copy_contact, copy_found
+from iapb.contact.kernels.shape_frames import copy_contact, copy_contacts
+from iapb.contact.kernels.world import StepEnd, StepStart
 from iapb.mechanics.kernels.kinematics import forward_kinematics
 from iapb.numerics.compiled import copy_into, kernel
-from iapb.numerics.linalg import add, add_multiple, dot, load, store, subtract, transform
+from iapb.numerics.copying import copier
+from iapb.numerics.linalg import (
+    add_multiple,
+    dot,
+    load,
+    norm,
+    placed,
+    store,
+    subtract,
+)
+from iapb.numerics.schema import quantities
 from iapb.run import COLLIDING
 
 MOST = 8  # parts after which a component is cut no more in this step
 SAG = 0.01  # share of the deepest overlap of a group: a new overlap below it is no touch to find
 MOST_SAMPLES = 64.0  # moments of a step at which fast bodies are looked at
 SEARCHES = 16  # motions tried to find a touch; every fourth one halves the bracket
+copy_changes = copier(quantities(StepStart))
+copy_end = copier(quantities(StepEnd))
 MET = -1  # status: the component reaches a tree outside, and both are cut together
 
 
@@ -72,8 +87,8 @@ def cut_at_touch(world, state, applied):
     if count < 0:
         return TOO_MANY_CONTACTS
     cut.arriving[0] = count
-    copy_into(cut.end_q, state.q)
-    copy_into(cut.end_v, state.v)
+    copy_into(cut.end.q, state.q)
+    copy_into(cut.end.v, state.v)
     return OK
 
 
@@ -107,26 +122,20 @@ def is_whole(world, state, body, other):
     """Return whether one of two bodies is in the group that is never cut."""
     whole = state.cut.whole[0]
     group = state.group_of_tree
-    if whole < 0:
-        return False
-    if group[world.tree_of_body[body]] == group[whole]:
-        return True
-    return other >= 0 and group[world.tree_of_body[other]] == group[whole]
+    a, b = trees_of_bodies(world, body, other)
+    return whole >= 0 and group[whole] in (group[a], group[b])
 
 
 @kernel
 def deepest_of_groups(world, state, i):
     """Return the deepest overlap [m] in the groups of the two bodies of contact i of `arriving`."""
-    found = state.arriving
     now = state.contacts
     deepest = 0.0
-    one = state.group_of_tree[world.tree_of_body[found.body_a[i]]]
-    other = one
-    if found.body_b[i] >= 0:
-        other = state.group_of_tree[world.tree_of_body[found.body_b[i]]]
+    groups = state.group_of_tree
+    a, b = trees_of(world, state.arriving, i)
     for k in range(state.contact_count[0]):
-        group = group_of_contact(world, now, k, state.group_of_tree)
-        if group in (one, other) and not now.idle[k]:
+        group = group_of_contact(world, now, k, groups)
+        if group in (groups[a], groups[b]) and not now.idle[k]:
             deepest = max(deepest, -now.gap[k])
     return deepest
 
@@ -204,11 +213,7 @@ def find_fast_pairs(world, state):
 @kernel
 def middle_of(world, state, i):
     """Return the middle of shape i in the world."""
-    body = world.shapes.body[i]
-    middle = load(world.sweep.middle, i)
-    if body < 0:
-        return middle
-    return add(load(state.body.position, body), transform(state.body.rotation, body, middle))
+    return placed(state.body, world.shapes.body[i], load(world.sweep.middle, i))
 
 
 @kernel
@@ -217,61 +222,50 @@ def way_of(world, state, i):
     body = world.shapes.body[i]
     if body < 0 or world.sweep.radius[i] == math.inf:
         return 0.0
-    p, u, omega = twist(world.mechanism, state.body, body, state.v)
+    p, u, omega = twist(world, state, body)
     arm = subtract(middle_of(world, state, i), p)
-    reach = math.sqrt(dot(arm, arm)) + world.sweep.radius[i]
-    return world.dt * (math.sqrt(dot(u, u)) + math.sqrt(dot(omega, omega)) * reach)
+    reach = norm(arm) + world.sweep.radius[i]
+    return world.dt * (norm(u) + norm(omega) * reach)
 
 
 @kernel
 def link(world, state, body, other):
     """Join the components of two bodies, the second −1 for the world; they are to be cut."""
     cut = state.cut
-    a = cut.component[world.tree_of_body[body]]
-    b = a if other < 0 else cut.component[world.tree_of_body[other]]
+    one, two = trees_of_bodies(world, body, other)
+    first = min(cut.component[one], cut.component[two])
+    last = max(cut.component[one], cut.component[two])
     for t in range(cut.component.shape[0]):
-        if cut.component[t] == max(a, b):
-            cut.component[t] = min(a, b)
-    cut.touches[min(a, b)] = True
+        if cut.component[t] == last:
+            cut.component[t] = first
+    cut.touches[first] = True
 
 
 @kernel
 def keep_start(state):
     """Keep the start of the step, after its impacts, and the end of the whole step."""
     cut = state.cut
-    copy_start(cut.start, state, state.contact_count[0])
-    copy_into(cut.start.v, state.start_v)
-    copy_into(cut.end_q, state.q)
-    copy_into(cut.end_v, state.v)
-    copy_into(cut.end_penalty, state.penalty_force)
-    copy_into(cut.end_friction, state.friction_force)
-    cut.start.impacts[0] = state.impacts.logged[0]
-    for i in range(state.contact_count[1]):
-        copy_all(cut.start.previous, i, state.previous, i)
+    copy_start(cut.start, state)
+    copy_into(cut.start_v, state.start_v)
+    copy_end(cut.end, state)
+    cut.logged[0] = state.impacts.logged[0]
+    copy_contacts(cut.start.previous, state.previous, state.contact_count[1])
 
 
 @kernel
 def back_to_start(state):
     """Take back what parts of the step have changed, but for q and v."""
-    start = state.cut.start
-    copy_start(state, start, start.contact_count[0])
-    state.impacts.logged[0] = start.impacts[0]
+    copy_start(state, state.cut.start)
+    state.impacts.logged[0] = state.cut.logged[0]
     for t in range(state.cut.struck.shape[0]):
         state.cut.struck[t] = state.state_of_tree[t] == COLLIDING
 
 
 @kernel
-def copy_start(to, given, count):
-    """Copy what a part of a step changes; the first `count` contacts."""
-    copy_into(to.impulse, given.impulse)
-    copy_into(to.contact_impulse, given.contact_impulse)
-    copy_into(to.contact_count, given.contact_count)
-    copy_into(to.group_of_tree, given.group_of_tree)
-    copy_into(to.state_of_tree, given.state_of_tree)
-    copy_into(to.spreading, given.spreading)
-    copy_into(to.rests, given.rests)
-    for i in range(count):
-        copy_all(to.contacts, i, given.contacts, i)
+def copy_start(to, given):
+    """Copy what a part of a step changes."""
+    copy_changes(to, given)
+    copy_contacts(to.contacts, given.contacts, given.contact_count[0])
 
 
 @kernel
@@ -318,13 +312,12 @@ def cut_component(world, state, applied, root):
         if status != OK:
             return status
     add_part(state, left)
-    for i in range(state.q.shape[0]):
-        cut.end_q[i] = state.q[i]
+    copy_into(cut.end.q, state.q)
+    copy_into(cut.end.v, state.v)
     for k in range(state.v.shape[0]):
-        cut.end_v[k] = state.v[k]
         if state.moving[world.tree_of_dof[k]]:
-            cut.end_penalty[k] = cut.penalty[k] / world.dt
-            cut.end_friction[k] = cut.friction[k] / world.dt
+            cut.end.penalty_force[k] = cut.penalty[k] / world.dt
+            cut.end.friction_force[k] = cut.friction[k] / world.dt
     return OK
 
 
@@ -339,10 +332,9 @@ def begin_component(world, state, root):
     for i in range(state.contact_count[0]):
         state.contacts.idle[i] = not takes_part(world, state, state.contacts, i)
     state.contact_count[1] = cut.start.contact_count[1]
-    for i in range(state.contact_count[1]):
-        copy_all(state.previous, i, cut.start.previous, i)
-    copy_into(cut.part_q, cut.start.q)
-    copy_into(cut.part_v, cut.start.v)
+    copy_contacts(state.previous, cut.start.previous, state.contact_count[1])
+    copy_into(cut.part_q, cut.start_q)
+    copy_into(cut.part_v, cut.start_v)
     cut.elapsed[0] = 0.0
     cut.penalty[:] = cut.friction[:] = 0.0
     return size
@@ -351,34 +343,33 @@ def begin_component(world, state, root):
 @kernel
 def takes_part(world, state, contacts, i):
     """Return whether both bodies of a contact move now; the world takes part in everything."""
-    a = world.tree_of_body[contacts.body_a[i]]
-    b = contacts.body_b[i]
-    return state.moving[a] and (b < 0 or state.moving[world.tree_of_body[b]])
+    a, b = trees_of(world, contacts, i)
+    return state.moving[a] and state.moving[b]
 
 
 @kernel
 def move_part(world, state, applied, h):
     """Move the component from the start of the part by h [s]; all others are at the end of the
     step. Return a status."""
-    cut = state.cut
-    for i in range(state.q.shape[0]):
-        moves = state.moving[world.tree_of_coordinate[i]]
-        state.q[i] = cut.part_q[i] if moves else cut.end_q[i]
-    for k in range(state.v.shape[0]):
-        state.v[k] = cut.part_v[k] if state.moving[world.tree_of_dof[k]] else cut.end_v[k]
-        state.penalty_force[k] = state.friction_force[k] = 0.0
+    move_others_to_end(world, state, state.cut.part_q, state.cut.part_v)
+    state.penalty_force[:] = state.friction_force[:] = 0.0
     if not locate(world, state):
         return NOT_POSITIVE_DEFINITE
     state.h[0] = h
     status = move(world, state, applied)
     state.h[0] = world.dt
-    for i in range(state.q.shape[0]):
-        if not state.moving[world.tree_of_coordinate[i]]:
-            state.q[i] = cut.end_q[i]
-    for k in range(state.v.shape[0]):
-        if not state.moving[world.tree_of_dof[k]]:
-            state.v[k] = cut.end_v[k]
+    move_others_to_end(world, state, state.q, state.v)
     return status
+
+
+@kernel
+def move_others_to_end(world, state, q, v):
+    """Write q and v of the trees that move now; put all others at the end of the step."""
+    end = state.cut.end
+    for i in range(q.shape[0]):
+        state.q[i] = q[i] if state.moving[world.tree_of_coordinate[i]] else end.q[i]
+    for k in range(v.shape[0]):
+        state.v[k] = v[k] if state.moving[world.tree_of_dof[k]] else end.v[k]
 
 
 @kernel
@@ -389,13 +380,11 @@ def reached(world, state):
     found = state.arriving
     count = contacts_at_end(world, state)
     for i in range(count):
-        b = found.body_b[i]
-        inside = state.moving[world.tree_of_body[found.body_a[i]]]
-        other = inside if b < 0 else state.moving[world.tree_of_body[b]]
-        if (inside or other) and arrives(world, state, i):
+        a, b = trees_of(world, found, i)
+        if (state.moving[a] or state.moving[b]) and arrives(world, state, i):
             some = True
-            if inside != other:
-                link(world, state, found.body_a[i], b)
+            if state.moving[a] != state.moving[b]:
+                link(world, state, found.body_a[i], found.body_b[i])
                 return True, True
     return some, False
 
@@ -447,7 +436,7 @@ def overlaps_now(world, state):
 @kernel
 def velocities_and_marks(world, state, count):
     """Complete the contacts of `arriving`: their velocities, and whether they are new."""
-    contact_velocities(world.mechanism, state.body, state.v, state.arriving, count)
+    contact_velocities(world, state, state.arriving, count)
     mark_new(
         state.arriving,
         count,
@@ -581,8 +570,7 @@ def gaps_of_pairs(world, state, pairs):
     return detect(
         world.shapes,
         state.cut.pairs[:pairs],
-        state.body.rotation,
-        state.body.position,
+        state.body,
         math.inf,
         state.arriving,
     )
@@ -610,9 +598,8 @@ def take_contacts(world, state):
     found_count = contacts_at_end(world, state)
     if found_count < 0:
         return False
-    for i in range(count):
-        copy_all(before, i, now, i)
-        state.row_impulse[i] = state.contact_impulse[i]
+    copy_contacts(before, now, count)
+    copy_into(state.row_impulse[:count], state.contact_impulse)
     state.contact_count[1] = count
     room = now.gap.shape[0]  # for those that are apart
     for i in range(found_count):
@@ -629,7 +616,7 @@ def take_contacts(world, state):
             room -= 1
             if room < 0:
                 continue
-        copy_all(now, kept, before, i)
+        copy_contact(now, kept, before, i)
         if not before.idle[i]:
             now.gap[kept] = 0.0
             now.normal_force[kept] = 0.0
@@ -643,7 +630,7 @@ def take_contacts(world, state):
             continue
         if kept == now.gap.shape[0]:
             return False
-        copy_found(now, kept, found, i)
+        copy_contact(now, kept, found, i)
         now.mark[kept] = 0
         now.normal_force[kept] = 0.0
         state.contact_impulse[kept] = 0.0
@@ -697,8 +684,6 @@ def strike(world, state, flies):
 def let_go(world, state):
     """Take contacts that an impact has separated out of the forces of the rest of the step."""
     contacts = state.contacts
-    now = state.scratch_contacts
-    count = state.contact_count[0]
     some = False
     for t in range(state.moving.shape[0]):
         collides = state.moving[t] and state.state_of_tree[t] == COLLIDING
@@ -706,30 +691,22 @@ def let_go(world, state):
         state.rests[t] = state.rests[t] and not collides
     if not some:
         return
-    for i in range(count):
-        copy_contact(now, i, contacts, i)
-    contact_velocities(world.mechanism, state.body, state.v, now, count)
-    for i in range(count):
-        a = world.tree_of_body[contacts.body_a[i]]
-        b = contacts.body_b[i]
+    now = contacts_moving_now(world, state)
+    for i in range(state.contact_count[0]):
+        a, b = trees_of(world, contacts, i)
         if contacts.idle[i] or state.state_of_tree[a] != COLLIDING:
             continue
         if now.normal_velocity[i] > world.approach_velocity and contacts.gap[i] >= -CLOSE:
             contacts.mark[i] = LEFT
         elif contacts.mark[i] != LEFT:
-            state.rests[a] = True
-            if b >= 0:
-                state.rests[world.tree_of_body[b]] = True
+            state.rests[a] = state.rests[b] = True
 
 
 @kernel
 def end_step(world, state):
     """Write the end of the step, put together from whole and from cut steps."""
     cut = state.cut
-    copy_into(state.q, cut.end_q)
-    copy_into(state.v, cut.end_v)
-    copy_into(state.penalty_force, cut.end_penalty)
-    copy_into(state.friction_force, cut.end_friction)
+    copy_end(state, cut.end)
     state.contacts.idle[: state.contact_count[0]] = False
     cut.elapsed[0] = 0.0
     for t in range(state.moving.shape[0]):

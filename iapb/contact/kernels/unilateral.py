@@ -14,7 +14,7 @@ from typing import Annotated, NamedTuple
 from iapb.contact.kernels.impact import apply_change, write_change
 from iapb.contact.kernels.row_basis import minimum_norm_factors, orthonormal_basis
 from iapb.numerics.compiled import copy_into, kernel
-from iapb.numerics.linalg import add_multiple, dot_of, orthogonalize
+from iapb.numerics.linalg import add_multiple, dot_of, norm_of, orthogonalize
 from iapb.numerics.schema import Booleans, Floats, Integers
 
 # A row counts as closing if its speed exceeds this share, times d, of the terms that it is summed
@@ -215,7 +215,7 @@ def share_compression(d, count, restitution, tolerance, compressed, impulses, wo
         weight[i] = 1.0 / math.sqrt(equal) if tight[i] else 0.0
         kinds += weight[i] * weight[i]
         shared[i] = left[i] = impulses[i] / weight[i] if tight[i] else 0.0
-    norm = math.sqrt(dot_of(shared, shared))
+    norm = norm_of(shared)
     if norm == 0.0 or kinds < rank + 0.5:
         return
     minimum_norm_factors(d, count, rank, weight, work)

@@ -88,12 +88,10 @@ class World(NamedTuple):
     damping: float  # B [N s/m] (5)
     tangents: int  # of a contact: 1 in the plane, 2 in space
     clamped: bool  # F_n >= 0; False: (5) as printed, may pull
-    friction_class: np.ndarray  # (shapes + stops,) int64
+    surface: np.ndarray  # (shapes + stops,) int64: the class of a shape
     friction: np.ndarray  # (classes, classes) μ (6) of two shapes by their classes
+    restitution: np.ndarray  # (classes, classes) e of two shapes
     friction_velocity: float  # v_threshold [m/s] (6)
-    restitution: float  # e of all contacts whose shapes give no e of their own
-    # (shapes + stops,) e that a shape's body or wall gives, above 1 = none
-    own_restitution: np.ndarray
     approach_velocity: float  # v_approach [m/s]: slower approach is not a collision
     cluster_distance: float  # [m]
     coherence_distance: float  # [m]
@@ -109,18 +107,24 @@ class World(NamedTuple):
 class StepStart(NamedTuple):
     """The start of a step that is cut, after the impacts there: with the names of `State`."""
 
-    q: Annotated[Floats, "coordinate"]
-    v: Annotated[Floats, "velocity"]
     impulse: Annotated[Floats, "velocity"]
     contact_impulse: Annotated[Floats, "row"]
     contact_count: Annotated[Integers, "2"]
-    impacts: Annotated[Integers, "1"]  # lines of their log
     contacts: ContactBuffer
     previous: ContactBuffer
     group_of_tree: Annotated[Integers, "tree"]
     state_of_tree: Annotated[States, "tree"]
     spreading: Annotated[Booleans, "tree"]
     rests: Annotated[Booleans, "tree"]
+
+
+class StepEnd(NamedTuple):
+    """The end of a step that is cut: with the names of `State`."""
+
+    q: Annotated[Floats, "coordinate"]
+    v: Annotated[Floats, "velocity"]
+    penalty_force: Annotated[Floats, "velocity"]  # [N, N m] mean over the step
+    friction_force: Annotated[Floats, "velocity"]
 
 
 class Cut(NamedTuple):
@@ -130,11 +134,11 @@ class Cut(NamedTuple):
     elapsed: Annotated[Floats, "1"]  # [s] since the start of the step
     whole: Annotated[Integers, "1"]  # a tree whose group is never cut, −1 = none
     start: StepStart
+    start_q: Annotated[Floats, "coordinate"]
+    start_v: Annotated[Floats, "velocity"]
+    logged: Annotated[Integers, "1"]  # impacts at the start
     struck: Annotated[Booleans, "tree"]  # in some part of the step
-    end_q: Annotated[Floats, "coordinate"]
-    end_v: Annotated[Floats, "velocity"]
-    end_penalty: Annotated[Floats, "velocity"]  # [N, N m] mean over the step
-    end_friction: Annotated[Floats, "velocity"]
+    end: StepEnd
     part_q: Annotated[Floats, "coordinate"]  # the start of the present part
     part_v: Annotated[Floats, "velocity"]
     penalty: Annotated[Floats, "velocity"]  # [N s, N m s] of the parts so far
@@ -197,4 +201,4 @@ class State(NamedTuple):
     tree_energy: Annotated[Floats, "tree"]  # of a tree, in free motion
     # of the step: `logged` (1,) lines in use, and (t,) lines of `iapb.run.ImpactTable`, without the
     # step
-    impacts: Any
+    impacts: Any = ()

@@ -10,7 +10,7 @@ from math import sqrt
 from iapb.mechanics.joints import CONTINUOUS, FREE_FLYER, SPHERICAL
 from iapb.numerics.compiled import kernel
 from iapb.numerics.elementary import arc_tangent, sine_cosine
-from iapb.numerics.linalg import add, cross, dot, scale
+from iapb.numerics.linalg import add, cross, dot, norm, scale
 
 # Below this angle [rad] the series of the screw coefficients (two terms kept) is exact to 1e-17,
 # while the closed forms lose digits: 1 - cos keeps eps / angle^2.
@@ -28,7 +28,7 @@ def turn_vector(x, y, z, s, a):
 @kernel
 def turn_quaternion(q, i, phi, out):
     """Quaternion at i <- q * exp(phi / 2), phi [rad] a rotation vector in body axes."""
-    angle = sqrt(dot(phi, phi))
+    angle = norm(phi)
     sin, t = sine_cosine(0.5 * angle)
     factor = 0.5 - angle * angle / 48.0 if angle < SMALL_ANGLE else sin / angle
     b = scale(factor, phi)
@@ -57,7 +57,7 @@ def integrate_in_space(m, b, q, v, dt, out):
         return
     u = (v[k] * dt, v[k + 1] * dt, v[k + 2] * dt)
     phi = (v[k + 3] * dt, v[k + 4] * dt, v[k + 5] * dt)
-    angle = sqrt(dot(phi, phi))
+    angle = norm(phi)
     square = angle * angle
     if angle < SMALL_ANGLE:
         first = 0.5 - square / 24.0
@@ -131,7 +131,7 @@ def quaternion_difference(q0, q1, i):
     if scalar < 0.0:  # q and -q are the same rotation: take the shorter way
         vector = scale(-1.0, vector)
         scalar = -scalar
-    length = sqrt(dot(vector, vector))
+    length = norm(vector)
     factor = 2.0 if length == 0.0 else 2.0 * arc_tangent(length, scalar) / length
     return scale(factor, vector)
 
@@ -151,7 +151,7 @@ def difference_in_space(m, b, q0, q1, out):
     phi = quaternion_difference(q0, q1, i + 3)
     path = (q1[i] - q0[i], q1[i + 1] - q0[i + 1], q1[i + 2] - q0[i + 2])
     path = turn_vector(-q0[i + 3], -q0[i + 4], -q0[i + 5], q0[i + 6], path)
-    angle = sqrt(dot(phi, phi))
+    angle = norm(phi)
     square = angle * angle
     if angle < SMALL_ANGLE:
         factor = 1.0 / 12.0 + square / 720.0

@@ -29,13 +29,14 @@ from iapb.mechanics.kernels.configuration import integrate_body, turn_quaternion
 from iapb.numerics.compiled import kernel
 from iapb.numerics.elementary import sine_cosine
 from iapb.numerics.linalg import (
+    accumulate,
     add,
     cross,
     dot,
     load,
+    norm,
     scale,
     solve_mass,
-    store,
     subtract,
     transform,
     transform_back,
@@ -83,7 +84,7 @@ def turn_freely(free, t, q, i, v, k, dt):
     first = 1.0 / I[0] - 1.0 / I[1]
     third = 1.0 / I[2] - 1.0 / I[1]
     if first != 0.0 or third != 0.0:
-        turn = dt * sqrt(dot(omega, omega))
+        turn = dt * norm(omega)
         single = turn < SLOW_ANGLE or first == 0.0 or third == 0.0
         parts = 1 if single else max(1, min(MOST_PARTS, ceil(turn / RIGID_ANGLE)))
         for part in range(parts if single else 3 * parts):
@@ -253,8 +254,8 @@ def shift_root(m, free, w, tree_of_body, q, t, shift):
         q[i + 2] += local[2]
     for b in range(m.kind.shape[0]):
         if tree_of_body[b] == t:
-            store(w.position, b, add(load(w.position, b), shift))
-            store(w.center, b, add(load(w.center, b), shift))
+            accumulate(w.position, b, shift)
+            accumulate(w.center, b, shift)
 
 
 @kernel

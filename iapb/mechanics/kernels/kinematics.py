@@ -4,10 +4,11 @@ from iapb.mechanics.joints import CONTINUOUS, FIXED, FREE_FLYER, PLANAR, PRISMAT
 from iapb.numerics.compiled import kernel
 from iapb.numerics.elementary import sine_cosine
 from iapb.numerics.linalg import (
-    add,
+    accumulate,
     column,
     cross,
     load,
+    placed,
     scale,
     store,
     store_columns,
@@ -54,16 +55,12 @@ def move_joint(m, q, w, b):
     k = m.v_start[b]
     if kind == PLANAR:  # axes of the joint frame: they do not turn with the body
         body_axes_to_dofs(w, b, k)
-        store(
-            w.position, b, add(load(w.position, b), transform(w.rotation, b, (q[i], q[i + 1], 0.0)))
-        )
+        store(w.position, b, placed(w, b, (q[i], q[i + 1], 0.0)))
         s, c = sine_cosine(q[i + 2])
         turn_about_axis(w, b, (0.0, 0.0, 1.0), c, s)
     elif kind == PRISMATIC:
         store(w.axis, k, transform(w.rotation, b, load(m.joint_axis, b)))
-        store(
-            w.position, b, add(load(w.position, b), scale(joint_position(m, q, b), load(w.axis, k)))
-        )
+        accumulate(w.position, b, scale(joint_position(m, q, b), load(w.axis, k)))
     elif kind in (REVOLUTE, CONTINUOUS):
         a = load(m.joint_axis, b)
         store(w.axis, k, transform(w.rotation, b, a))
@@ -71,11 +68,7 @@ def move_joint(m, q, w, b):
         turn_about_axis(w, b, a, c, s)
     elif kind != FIXED:  # a unit quaternion, after the position of a free flyer
         if kind == FREE_FLYER:
-            store(
-                w.position,
-                b,
-                add(load(w.position, b), transform(w.rotation, b, (q[i], q[i + 1], q[i + 2]))),
-            )
+            store(w.position, b, placed(w, b, (q[i], q[i + 1], q[i + 2])))
             i += 3
         x = q[i]
         y = q[i + 1]
@@ -120,15 +113,11 @@ def forward_kinematics(m, q, w):
             x = transform(R, parent, x)
             y = transform(R, parent, y)
             z = transform(R, parent, z)
-            offset = add(load(w.position, parent), transform(R, parent, offset))
+            offset = placed(w, parent, offset)
         store_columns(R, b, x, y, z)
         store(w.position, b, offset)
         move_joint(m, q, w, b)
-        store(
-            w.center,
-            b,
-            add(load(w.position, b), transform(w.rotation, b, load(m.center_of_mass, b))),
-        )
+        store(w.center, b, placed(w, b, load(m.center_of_mass, b)))
 
 
 # Jacobians of points and frames, and forces at points, from the axes of the dofs (paper (1), J_i
