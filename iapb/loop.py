@@ -12,7 +12,7 @@ from iapb.haptics.rendering import NO_COUPLING, couple, move_device, read_device
 from iapb.numerics.compiled import Entry, block, copy_into, kernel
 from iapb.numerics.copying import line_copier
 from iapb.numerics.linalg import load, store
-from iapb.numerics.schema import Quantity, blank, quantities
+from iapb.numerics.schema import Integers, Quantity, blank, quantities
 from iapb.run import MADE_AFTERWARDS, ContactTable, ImpactTable, Run
 
 DEVICE_NOT_FINITE = 1 + max(STATUS_TEXT)
@@ -45,7 +45,7 @@ Coordinates = tuple[int, int, int, int]
 class Record(NamedTuple):
     """Memory for up to n steps of at most c contacts and m impacts, with the names of `iapb.run`."""
 
-    used: np.ndarray  # (3,) int64: steps, contacts and impacts written so far
+    used: Integers  # (3,) steps, contacts and impacts written so far
     steps: Any  # n lines, with the states at the *end* of each step
     contacts: Any  # n c lines
     # n m lines, one per island and impact; the time is that since the start of the step
@@ -77,10 +77,10 @@ def make_record(steps: int, coordinates: Coordinates, contacts: int, impacts: in
 def write_step(record, k, step, state, port):
     """Copy step number `step` into line k of the record."""
     line = record.steps
-    for i in range(state.q.shape[0]):
+    for i in range(len(state.q)):
         line.q[k, i] = state.q[i]
     # one loop: eight short ones would cost more than what they copy
-    for i in range(state.v.shape[0]):
+    for i in range(len(state.v)):
         line.v[k, i] = state.v[i]
         line.hand_force[k, i] = port.hand_force[i]
         line.coupling_force[k, i] = port.coupling_force[i]
@@ -88,9 +88,9 @@ def write_step(record, k, step, state, port):
         line.friction_force[k, i] = state.friction_force[i]
         line.impulse[k, i] = state.impulse[i]
         line.environment_force[k, i] = port.environment_force[i]
-    for i in range(port.device_q.shape[0]):
+    for i in range(len(port.device_q)):
         line.device_q[k, i] = port.device_q[i]
-    for i in range(port.device_v.shape[0]):
+    for i in range(len(port.device_v)):
         line.device_v[k, i] = port.device_v[i]
         line.device_force[k, i] = port.device_force[i]
     line.state[k] = contact_state(state, port.tool_tree)
@@ -130,7 +130,7 @@ def steps_of_loop(world, state, port, record, parts, first, steps):
     status."""
     line = record.used[0]
     for k in range(steps):
-        if parts == WHOLE and port.planned.shape[0] > 0:
+        if parts == WHOLE and len(port.planned) > 0:
             copy_into(port.wrench, port.planned[k])
         if parts & COUPLE:
             couple(world, state, port)
@@ -151,7 +151,7 @@ def steps_of_loop(world, state, port, record, parts, first, steps):
 def steps_with_hand(world, state, port, q, v, forces):
     """Do one step of an engine law for each reading (n, d) of a device that the hand moves; write the
     actuator force of each step."""
-    for k in range(q.shape[0]):
+    for k in range(len(q)):
         read_device(world, state, port, q[k], v[k])
         couple(world, state, port)
         status = advance(world, state, port.applied)
@@ -159,7 +159,7 @@ def steps_with_hand(world, state, port, q, v, forces):
             return k, status
         render(world, state, port)
         copy_into(forces[k], port.device_force)
-    return q.shape[0], 0
+    return len(q), 0
 
 
 run_steps = Entry(steps_of_loop)

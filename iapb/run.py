@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from iapb.errors import name_the_extra
 from iapb.lazy import extension, needed
-from iapb.numerics.schema import Booleans, Floats, Integers, Quantity, States, quantities, quantity
+from iapb.numerics.schema import Booleans, Floats, Integers, Quantity, States, quantities
 
 # contact states of the paper, section III
 FREE = 0
@@ -46,29 +46,29 @@ class ContactTable:
 
     offsets: Annotated[
         Integers,
-        quantity("step_edge", "1", "first row of each step's contacts; the last entry closes"),
+        "step_edge",
+        "1",
+        "first row of each step's contacts; the last entry closes",
     ]
-    body_a: Annotated[Integers, quantity("contact", "1", "moving body that the normal points into")]
-    body_b: Annotated[Integers, quantity("contact", "1", "other body, -1 = the static world")]
+    body_a: Annotated[Integers, "contact", "1", "moving body that the normal points into"]
+    body_b: Annotated[Integers, "contact", "1", "other body, -1 = the static world"]
     point: Annotated[
         Floats,
-        quantity(
-            "contact axis", "m", "contact point, world axes; with an impulse: where it struck"
-        ),
+        "contact axis",
+        "m",
+        "contact point, world axes; with an impulse: where it struck",
     ]
-    normal: Annotated[Floats, quantity("contact axis", "1", "unit normal, from b into a")]
-    gap: Annotated[Floats, quantity("contact", "m", "distance, negative = overlap")]
+    normal: Annotated[Floats, "contact axis", "1", "unit normal, from b into a"]
+    gap: Annotated[Floats, "contact", "m", "distance, negative = overlap"]
     normal_velocity: Annotated[
-        Floats, quantity("contact", "m/s", "before the step's impulse, positive separates")
+        Floats, "contact", "m/s", "before the step's impulse, positive separates"
     ]
-    normal_force: Annotated[Floats, quantity("contact", "N", "force on a along the normal")]
-    friction_force: Annotated[Floats, quantity("contact axis", "N", "friction force on a")]
+    normal_force: Annotated[Floats, "contact", "N", "force on a along the normal"]
+    friction_force: Annotated[Floats, "contact axis", "N", "friction force on a"]
     # the one of least norm if it is not unique
-    impulse: Annotated[
-        Floats, quantity("contact", "N s", "collision impulse on a along the normal")
-    ]
+    impulse: Annotated[Floats, "contact", "N s", "collision impulse on a along the normal"]
     is_new: Annotated[
-        Booleans, quantity("contact", "1", "1 where the contact was not there in the step before")
+        Booleans, "contact", "1", "1 where the contact was not there in the step before"
     ]
 
 
@@ -80,43 +80,41 @@ class ImpactTable:
     is not in it.
     """
 
-    step: Annotated[Integers, quantity("impact", "1", "step in which it happened")]
-    group: Annotated[Integers, quantity("impact", "1", "first tree of those resolved together")]
-    v_minus: Annotated[Floats, quantity("impact velocity", VELOCITY, "generalized velocity before")]
-    v_plus: Annotated[Floats, quantity("impact velocity", VELOCITY, "generalized velocity after")]
-    impulse: Annotated[Floats, quantity("impact velocity", IMPULSE, "generalized impulse")]
-    rows: Annotated[Integers, quantity("impact", "1", "rows given to the resolver")]
-    rank: Annotated[Integers, quantity("impact", "1", "rows it found independent and used")]
-    energy_lost: Annotated[Floats, quantity("impact", "J", "kinetic energy before minus after")]
-    scale: Annotated[
-        Floats, quantity("impact", "1", "factor by which the device limit scaled the impulse")
-    ]
-    clamp: Annotated[Floats, quantity("impact", "1", "factor of the final energy clamp")]
+    step: Annotated[Integers, "impact", "1", "step in which it happened"]
+    group: Annotated[Integers, "impact", "1", "first tree of those resolved together"]
+    v_minus: Annotated[Floats, "impact velocity", VELOCITY, "generalized velocity before"]
+    v_plus: Annotated[Floats, "impact velocity", VELOCITY, "generalized velocity after"]
+    impulse: Annotated[Floats, "impact velocity", IMPULSE, "generalized impulse"]
+    rows: Annotated[Integers, "impact", "1", "rows given to the resolver"]
+    rank: Annotated[Integers, "impact", "1", "rows it found independent and used"]
+    energy_lost: Annotated[Floats, "impact", "J", "kinetic energy before minus after"]
+    scale: Annotated[Floats, "impact", "1", "factor by which the device limit scaled the impulse"]
+    clamp: Annotated[Floats, "impact", "1", "factor of the final energy clamp"]
     friction_share: Annotated[
-        Floats, quantity("impact", "1", "factor by which friction was reduced (energy, cones)")
+        Floats, "impact", "1", "factor by which friction was reduced (energy, cones)"
     ]
     approaching: Annotated[
         Integers,
-        quantity("impact", "1", "rows that approach still afterwards, -1 = the law does not say"),
+        "impact",
+        "1",
+        "rows that approach still afterwards, -1 = the law does not say",
     ]
     solved: Annotated[
         Booleans,
-        quantity(
-            "impact", "1", "0 where the law is not met (friction reduced); passive all the same"
-        ),
+        "impact",
+        "1",
+        "0 where the law is not met (friction reduced); passive all the same",
     ]
     mass_digest: Annotated[
         Integers,
-        quantity(
-            "impact",
-            "1",
-            "first 8 bytes of BLAKE2b of M made again from the recorded q, as a signed integer",
-        ),
+        "impact",
+        "1",
+        "first 8 bytes of BLAKE2b of M made again from the recorded q, as a signed integer",
     ]
     time: Annotated[
-        Floats, quantity("impact", "s", "when it happened, in its step: at its start or at a touch")
+        Floats, "impact", "s", "when it happened, in its step: at its start or at a touch"
     ]
-    q: Annotated[Floats, quantity("impact coordinate", POSITION, "configuration at that time")]
+    q: Annotated[Floats, "impact coordinate", POSITION, "configuration at that time"]
 
 
 # column of ImpactTable that is made after the run
@@ -181,47 +179,41 @@ class Run:
     tool_coordinates: tuple[int, int]
 
     time: Floats  # (n + 1,) [s]
-    q: Annotated[Floats, quantity("time coordinate", POSITION, "generalized configuration")]
-    v: Annotated[Floats, quantity("time velocity", VELOCITY, "generalized velocity")]
-    device_q: Annotated[
-        Floats, quantity("time device_coordinate", POSITION, "configuration of the device")
-    ]
-    device_v: Annotated[
-        Floats, quantity("time device_velocity", VELOCITY, "velocity of the device")
-    ]
+    q: Annotated[Floats, "time coordinate", POSITION, "generalized configuration"]
+    v: Annotated[Floats, "time velocity", VELOCITY, "generalized velocity"]
+    device_q: Annotated[Floats, "time device_coordinate", POSITION, "configuration of the device"]
+    device_v: Annotated[Floats, "time device_velocity", VELOCITY, "velocity of the device"]
     # of each body's frame: x, y, angle in (−π, π] in the plane; x, y, z and a quaternion x, y, z, w
     # >= 0 in space
-    pose: Annotated[Floats, quantity("time body placement", POSITION, "where each body is")]
+    pose: Annotated[Floats, "time body placement", POSITION, "where each body is"]
 
     hand_force: Annotated[
-        Floats, quantity("step velocity", FORCE, "generalized force of the hand on the tool")
+        Floats, "step velocity", FORCE, "generalized force of the hand on the tool"
     ]
-    coupling_force: Annotated[
-        Floats, quantity("step velocity", FORCE, "force of the coupling on the tool")
-    ]
+    coupling_force: Annotated[Floats, "step velocity", FORCE, "force of the coupling on the tool"]
     penalty_force: Annotated[
-        Floats, quantity("step velocity", FORCE, "normal contact forces, or constraint forces")
+        Floats, "step velocity", FORCE, "normal contact forces, or constraint forces"
     ]
-    friction_force: Annotated[Floats, quantity("step velocity", FORCE, "friction forces")]
+    friction_force: Annotated[Floats, "step velocity", FORCE, "friction forces"]
     impulse: Annotated[
-        Floats, quantity("step velocity", IMPULSE, "generalized collision impulse of the step")
+        Floats, "step velocity", IMPULSE, "generalized collision impulse of the step"
     ]
     environment_force: Annotated[
-        Floats, quantity("step velocity", FORCE, "contact forces + impulse / dt (26)")
+        Floats, "step velocity", FORCE, "contact forces + impulse / dt (26)"
     ]
     device_force: Annotated[
-        Floats, quantity("step device_velocity", FORCE, "what the device's actuators apply")
+        Floats, "step device_velocity", FORCE, "what the device's actuators apply"
     ]
-    state: Annotated[States, quantity("step", "1", "contact state of the tool's group")]
+    state: Annotated[States, "step", "1", "contact state of the tool's group"]
     contacts: ContactTable
     impacts: ImpactTable
     energy: dict[str, Floats]  # the ledger, see iapb.mechanics.energy
     effects: tuple[EffectRow, ...]
 
-    chunk_steps: Annotated[Integers, quantity("chunk", "1", "steps per timed chunk")] = field(
+    chunk_steps: Annotated[Integers, "chunk", "1", "steps per timed chunk"] = field(
         default_factory=lambda: np.zeros(0, np.int64)
     )
-    chunk_seconds: Annotated[Floats, quantity("chunk", "s", "wall time of each chunk")] = field(
+    chunk_seconds: Annotated[Floats, "chunk", "s", "wall time of each chunk"] = field(
         default_factory=lambda: np.zeros(0)
     )
     kernel: str = "compiled"  # or "python"

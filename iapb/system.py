@@ -72,8 +72,8 @@ class System:
         self.most_contacts = contact_capacity(self.shapes, self.pairs) + stops
         # a step that is cut also keeps those that have struck and are apart
         self.capacity = self.most_contacts * (2 if scene.contact.at_touch else 1)
-        self.joint_damping = scene_parts.joint_damping_of(scene, self.mechanism)
-        self.joint_friction = scene_parts.joint_friction_of(scene, self.mechanism)
+        self.joint_damping = scene_parts.of_joints(scene, self.mechanism, "joint_damping", 2)
+        self.joint_friction = scene_parts.of_joints(scene, self.mechanism, "joint_friction", 1)
         self.start = scene_parts.start_of(scene)
         self.surfaces = scene_parts.surfaces_of(scene, stops)
         of_pairs, _ = self.surfaces.by_pair(self.pairs)
@@ -157,6 +157,7 @@ class System:
                 pairs=self.pairs,
                 broad_phase=make_broad_phase(self.shapes, self.pairs),
                 sweep=_sweep_of(self),
+                trees=len(ranges),
                 tree_of_body=mechanism.tree_of_body,
                 tree_start=np.ascontiguousarray(ranges[:, 0]),
                 tree_stop=np.ascontiguousarray(ranges[:, 1]),

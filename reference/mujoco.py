@@ -39,6 +39,7 @@ from iapb.errors import IapbError
 from iapb.lazy import needed
 from iapb.mechanics.bodies import Body
 from iapb.mechanics.joints import KINDS, Mimic
+from iapb.mechanics.rotations import frame_along
 from iapb.run import INTERRUPTED, Run
 from iapb.scene import Scene
 from iapb.scene import mechanism as scene_parts
@@ -330,7 +331,7 @@ def _add_geom(spec: Any, carrier: Any, shapes: Shapes, i: int) -> None:
     elif kind in geometry.ENDLESS:
         if kind == geometry.HALF_PLANE:
             common["pos"] = [*corners[0], 0.0]
-            axes = geometry.frame_along(np.array([*corners[1], 0.0]))
+            axes = frame_along(np.array([*corners[1], 0.0]))
         else:
             axes = shapes.axes[i]
         carrier.add_geom(

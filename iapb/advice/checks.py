@@ -29,6 +29,7 @@ from iapb.contact.kernels.touch import MOST_SAMPLES
 from iapb.contact.solids import joined
 from iapb.effects import numbers
 from iapb.errors import counted
+from iapb.mechanics.rotations import frame_along
 from iapb.names import in_metres
 from iapb.numerics.schema import Floats, Integers
 from iapb.scene import Scene, SpatialScene, mechanism
@@ -194,7 +195,7 @@ class Start:
 
     def slips(self, i: int) -> Floats:
         """Jacobian rows (2, d) of contact i across its normal; in the plane one of them is zero."""
-        across = geometry.frame_along(self.found.normal[i])[:, :2].T
+        across = frame_along(self.found.normal[i])[:, :2].T
         return self.rows_along(np.full(2, i), across)
 
     @cached_property

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+from numpy.linalg import norm
 
 from iapb.contact.kernels.implicit import FADING
 from iapb.contact.solids import Solid, joined
@@ -98,7 +99,7 @@ class _Seen:
         """Negligible energy [J] of some bodies: to lift each by a thousandth of its size; and
         rounding of the scene."""
         rounding = 1e-14 * np.max(self.run.energy.get("kinetic", 0.0))
-        weights = np.linalg.norm(self.system.gravity) * self.mechanism.arrays.mass
+        weights = norm(self.system.gravity) * self.mechanism.arrays.mass
         sizes = np.where(np.isinf(self.sizes), 0.0, self.sizes)[:-1]
         return rounding + 1e-3 * (weights * sizes)[bodies].sum()
 
@@ -251,7 +252,7 @@ def _in_overlaps(seen: _Seen, gap: Floats, bodies: Booleans) -> float:
     depth = -gap.min(initial=0.0)
     mass = seen.mechanism.arrays.mass[bodies].sum()
     speed = depth / (FADING * seen.run.dt)
-    gravity = np.linalg.norm(seen.system.gravity)
+    gravity = norm(seen.system.gravity)
     return mass * (0.5 * speed**2 + gravity * depth)
 
 
@@ -333,16 +334,16 @@ def _spun(seen: _Seen) -> Iterator[str]:
             angular = v[:, 3:]
             linear = (turn @ v[:, :3, None])[..., 0]
         inertia = seen.mechanism.arrays.inertia[b]
-        spin = turn @ (angular @ inertia / np.linalg.norm(inertia, 2))[..., None]  # R I w / |I|
+        spin = turn @ (angular @ inertia / norm(inertia, 2))[..., None]  # R I w / |I|
         arm = np.cross(angular, seen.mechanism.arrays.center_of_mass[b])
         speed = turn @ arm[..., None] + linear[..., None]
         falls = seen.system.gravity[:, None] * run.dt
-        fastest = np.linalg.norm(linear, axis=1).max()
+        fastest = norm(linear, axis=1).max()
         for what, moved, due, most in (("spin", spin, 0.0, 0.0), ("speed", speed, falls, fastest)):
             changes = np.diff(moved, axis=0) - due
             changes[pushed[:, dofs].any(axis=1)] = 0.0
-            drift = np.linalg.norm(np.cumsum(changes, axis=0), axis=1).max()
-            share = drift / (max(np.linalg.norm(moved, axis=1).max(), most) + SLOW)
+            drift = norm(np.cumsum(changes, axis=0), axis=1).max()
+            share = drift / (max(norm(moved, axis=1).max(), most) + SLOW)
             if not share <= UNACCOUNTED:
                 yield f"the {what} of {body.name} changes by {100.0 * share:.3g} % although nothing touches it"
                 return
@@ -422,8 +423,8 @@ def _passed(seen: _Seen) -> Iterator[str]:
     for b in range(len(run.body_names)):
         turn, origin = _frames(run, b, np.arange(run.steps + 1))
         reach = max((solid.reach for solid in seen.solids.values() if solid.body == b), default=0.0)
-        turned = np.linalg.norm(np.diff(turn, axis=0), axis=(1, 2)) / math.sqrt(2.0)
-        moved[:, b] = np.linalg.norm(np.diff(origin, axis=0), axis=1) + reach * turned
+        turned = norm(np.diff(turn, axis=0), axis=(1, 2)) / math.sqrt(2.0)
+        moved[:, b] = norm(np.diff(origin, axis=0), axis=1) + reach * turned
     top = moved.max(axis=0)
     places = _places(run)[:-1]
     for a, b in seen.system.pairs.tolist():
@@ -438,7 +439,7 @@ def _passed(seen: _Seen) -> Iterator[str]:
         middle = other.points[0, : places.shape[2]]
         if other.body >= 0:
             middle = places[:first, other.body]
-        apart = np.linalg.norm(places[:first, one.body] - middle, axis=1) - one.reach - other.reach
+        apart = norm(places[:first, one.body] - middle, axis=1) - one.reach - other.reach
         k = np.flatnonzero((way > far) & (way >= apart))
         through = k[_crosses(run, one, other, k) | _crosses(run, other, one, k)]
         if len(through):
@@ -456,17 +457,15 @@ def _crosses(run: Run, one: Solid, other: Solid, k: Integers) -> Booleans:
         (one.points @ np.swapaxes(turned, 1, 2) + (at - origin)[:, None]) @ turn
         for (turned, at), (turn, origin) in zip(ours, theirs, strict=True)
     )
-    turns = [
-        np.linalg.norm(end[0] - start[0], axis=(1, 2))[:, None] for start, end in (ours, theirs)
-    ]
+    turns = [norm(end[0] - start[0], axis=(1, 2))[:, None] for start, end in (ours, theirs)]
     shift = np.diff(
         [at - origin for (_, at), (_, origin) in zip(ours, theirs, strict=True)], axis=0
     )
     # x'' of a path seen from a body that turns by ω: ω² x, and Coriolis' 2 ω v
     arc = (
-        np.linalg.norm(one.points, axis=1) * turns[0] * (turns[0] + 2.0 * turns[1])
-        + np.linalg.norm(before, axis=2) * turns[1] ** 2
-        + math.sqrt(2.0) * np.linalg.norm(shift[0], axis=1)[:, None] * turns[1]
+        norm(one.points, axis=1) * turns[0] * (turns[0] + 2.0 * turns[1])
+        + norm(before, axis=2) * turns[1] ** 2
+        + math.sqrt(2.0) * norm(shift[0], axis=1)[:, None] * turns[1]
     ) / 8.0
     return np.asarray(other.crossed(before, after, arc, one.radius).any(axis=1))
 
@@ -515,7 +514,7 @@ def _squeezed(seen: _Seen) -> Iterator[str]:
                 caught.append(step)
                 widest = max(widest, narrow)
         places = _places(run)[caught, b]
-        far = np.linalg.norm(places - places[:1], axis=1).max(initial=0.0)
+        far = norm(places - places[:1], axis=1).max(initial=0.0)
         if far > size:
             name = run.body_names[b]
             narrower = in_metres(widest)

@@ -20,10 +20,10 @@ class Contacts(NamedTuple):
     The normal is unit and points from b into a; the point lies midway between the surfaces.
     """
 
-    shape_a: Indices  #: (c,)
-    shape_b: Indices  #: (c,)
-    body_a: Indices  #: (c,)
-    body_b: Indices  #: (c,) -1 is the static world
+    shape_a: Integers  #: (c,)
+    shape_b: Integers  #: (c,)
+    body_a: Integers  #: (c,)
+    body_b: Integers  #: (c,) -1 is the static world
     feature: Integers  #: (c,) which vertex and edge touch
     point: Floats  #: (c, 3) [m]
     normal: Floats  #: (c, 3)

@@ -7,13 +7,21 @@ that body. Body -1 is the static world; its frame is the world frame.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from iapb.numerics.schema import Booleans, Floats, Indices, Integers, States
+from iapb.numerics.schema import (
+    FlagPerContact,
+    FloatPerContact,
+    Floats,
+    IndexPerContact,
+    Indices,
+    Integers,
+    States,
+    VectorPerContact,
+)
 
 HALF_PLANE = 0
 CIRCLE = 1
@@ -65,39 +73,39 @@ class ContactBuffer(NamedTuple):
     `gap`.
     """
 
-    shape_a: Annotated[Indices, "contact"]
-    shape_b: Annotated[Indices, "contact"]
-    body_a: Annotated[Indices, "contact"]  # moving body that the normal points into
-    body_b: Annotated[Indices, "contact"]  # other body, -1 = the static world
+    shape_a: IndexPerContact
+    shape_b: IndexPerContact
+    body_a: IndexPerContact  # moving body that the normal points into
+    body_b: IndexPerContact  # other body, -1 = the static world
     feature: Annotated[Integers, "contact"]  # which vertex and edge touch; stable while they do
     # [m] world, midway between the two surfaces along the normal
-    point: Annotated[Floats, "contact 3"]
-    normal: Annotated[Floats, "contact 3"]  # unit, from b into a
-    gap: Annotated[Floats, "contact"]  # [m] negative = overlap
+    point: VectorPerContact
+    normal: VectorPerContact  # unit, from b into a
+    gap: FloatPerContact  # [m] negative = overlap
     # found beside the geometry (`present_contacts`)
-    is_new: Annotated[Booleans, "contact"]  # not a contact of the previous step
-    normal_velocity: Annotated[Floats, "contact"]  # [m/s] positive separates
+    is_new: FlagPerContact  # not a contact of the previous step
+    normal_velocity: FloatPerContact  # [m/s] positive separates
     # [m/s] of a relative to b, orthogonal to the normal
-    tangential_velocity: Annotated[Floats, "contact 3"]
-    idle: Annotated[Booleans, "contact"]  # takes no part in the present part of a step
-    moved: Annotated[Booleans, "contact"]  # it has moved on in the step since it struck
-    lift: Annotated[Floats, "contact"]  # [m] that it would bend off its support in this part
+    tangential_velocity: VectorPerContact
+    idle: FlagPerContact  # takes no part in the present part of a step
+    moved: FlagPerContact  # it has moved on in the step since it struck
+    lift: FloatPerContact  # [m] that it would bend off its support in this part
     # what the next step needs to know
-    normal_force: Annotated[Floats, "contact"]  # [N] on a along the normal
-    expected: Annotated[Floats, "contact"]  # [m] gap after the step if it were linear
-    span: Annotated[Floats, "contact"]  # [s] of the part of a step that `expected` is about
-    sticks: Annotated[Booleans, "contact"]  # its points move together, by friction
-    point_a: Annotated[Floats, "contact 3"]  # [m] the point in the axes of body a
-    point_b: Annotated[Floats, "contact 3"]  # [m] the point in the axes of body b
-    slid: Annotated[Floats, "contact 3"]  # [m] Δt J v of the step
-    rolled: Annotated[Floats, "contact 3"]  # angle of a relative to b in the step, times the normal
-    drift: Annotated[Floats, "contact 3"]  # [m] a relative to b since they stick
+    normal_force: FloatPerContact  # [N] on a along the normal
+    expected: FloatPerContact  # [m] gap after the step if it were linear
+    span: FloatPerContact  # [s] of the part of a step that `expected` is about
+    sticks: FlagPerContact  # its points move together, by friction
+    point_a: VectorPerContact  # [m] the point in the axes of body a
+    point_b: VectorPerContact  # [m] the point in the axes of body b
+    slid: VectorPerContact  # [m] Δt J v of the step
+    rolled: VectorPerContact  # angle of a relative to b in the step, times the normal
+    drift: VectorPerContact  # [m] a relative to b since they stick
     # the rest of the step
-    collides: Annotated[Booleans, "contact"]  # enters the impact of this step
-    friction_force: Annotated[Floats, "contact 3"]  # [N] on a
+    collides: FlagPerContact  # enters the impact of this step
+    friction_force: VectorPerContact  # [N] on a
     mark: Annotated[States, "contact"]  # scratch of the clustering
-    struck_point: Annotated[Floats, "contact 3"]  # [m] where it struck, if it has moved on
-    struck_normal: Annotated[Floats, "contact 3"]  # the normal then
+    struck_point: VectorPerContact  # [m] where it struck, if it has moved on
+    struck_normal: VectorPerContact  # the normal then
 
 
 class Shape(NamedTuple):
@@ -172,12 +180,3 @@ def contact_capacity(shapes: Shapes, pairs: Indices) -> int:
     if total > SMALL_CAPACITY:
         total = min(total, max(SMALL_CAPACITY, CONTACTS_PER_SHAPE * len(shapes.kind)))
     return max(total + CLIPPING_ROOM * bool(np.any(shapes.kind == BOX)), 1)
-
-
-def frame_along(normal: Floats) -> Floats:
-    """Return right-handed axes (columns); the third axis points along `normal` (longer than 0)."""
-    z = normal / float(np.abs(normal).max())
-    z = z / math.sqrt(sum(x * x for x in z.tolist()))
-    x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
-    x = x / math.sqrt(sum(y * y for y in x.tolist()))
-    return np.column_stack([x, np.cross(z, x), z])

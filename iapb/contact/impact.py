@@ -20,8 +20,6 @@ from iapb.contact.kernels.resolve import (
     NOT_CONVERGED,
     SYMMETRY_TOLERANCE,
     Batch,
-    ResolveWork,
-    Results,
     resolve_each,
 )
 from iapb.contact.kernels.unilateral import ShareWork
@@ -342,29 +340,20 @@ def _resolve_one(
 def make_batch(n: int, c: int, d: int, directions: int = 0, unequal: bool = False) -> Any:
     """Return memory for n impacts of c contacts on d coordinates, and their results."""
     rows = max(1, c)
-    rubbing = n if directions else 0
-    return block(
-        Batch(
-            masses=np.empty((n, d, d)),
-            jacobians=np.empty((n, c, d)),
-            velocities=np.empty((n, d)),
-            restitution=np.empty(n),
-            unequal=np.empty((n if unequal else 0, c)),
-            tangents=np.empty((rubbing, c * directions, d)),
-            friction=np.empty((rubbing, c)),
-            work=zeros_of(
-                ResolveWork, velocity=d, row=rows, tangent=rows * directions, direction=directions
-            ),
-            share=zeros_of(ShareWork, velocity=(rows + 1) * unequal, row=rows * unequal),
-            out=Results(
-                np.empty((n, d)),
-                np.empty((n, d)),
-                np.empty((n, c)),
-                np.empty((n, c * directions)),
-                np.empty((n, 7)),
-            ),
-        )
+    batch = zeros_of(
+        Batch,
+        impact=n,
+        contact=c,
+        velocity=d,
+        row=rows,
+        direction=directions,
+        tangent=rows * directions,
+        slip=c * directions,
+        rubbing=n if directions else 0,
+        unequal=n if unequal else 0,
     )
+    share = zeros_of(ShareWork, velocity=(rows + 1) * unequal, row=rows * unequal)
+    return block(batch._replace(share=share))
 
 
 class _One:

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
+from numpy.linalg import norm
 
 from iapb.contact.geometry import ENDLESS, Shapes
 from iapb.numerics.schema import Booleans, Floats, Integers
@@ -37,19 +38,19 @@ class Solid(NamedTuple):
         centre = corners.mean(axis=0) if len(corners) else shapes.center[i]
         middle = centre if body < 0 else np.zeros(3)
         if radius > 0.0:
-            far = radius + float(np.linalg.norm(centre - middle))
+            far = radius + float(norm(centre - middle))
             flat = np.zeros((0, 3))
             return cls(body, centre[None], flat, flat[:, 0], radius, 2.0 * radius, far)
         if len(corners):
             edges = np.roll(corners, -1, axis=0) - corners
-            normals = np.cross(edges, [0.0, 0.0, 1.0]) / np.linalg.norm(edges, axis=1)[:, None]
+            normals = np.cross(edges, [0.0, 0.0, 1.0]) / norm(edges, axis=1)[:, None]
         else:
             signs = np.array([*itertools.product((-1, 1), repeat=3)])
             corners = centre + (signs * shapes.half_size[i]) @ shapes.axes[i].T
             normals = np.vstack([shapes.axes[i].T, -shapes.axes[i].T])
         points = np.vstack([centre, corners])
         over = points @ normals.T
-        far = float(np.linalg.norm(points - middle, axis=1).max())
+        far = float(norm(points - middle, axis=1).max())
         thin = float(np.ptp(over, axis=0).min())
         return cls(body, points, normals, over.max(axis=0), 0.0, thin, far)
 
@@ -57,7 +58,7 @@ class Solid(NamedTuple):
         """Return a height (n,) of points (n, 2 or 3) over the surface: zero on it, negative
         inside."""
         if self.radius > 0.0:
-            return np.linalg.norm(points - self.points[0, : points.shape[1]], axis=1) - self.radius
+            return norm(points - self.points[0, : points.shape[1]], axis=1) - self.radius
         return (points @ self.normals[:, : points.shape[1]].T - self.offsets).max(axis=1)
 
     def crossed(self, before: Floats, after: Floats, arc: Floats, radius: float) -> Booleans:
@@ -78,7 +79,7 @@ class Solid(NamedTuple):
             square = np.maximum((way * way).sum(axis=-1), 1e-300)
             share = np.clip(-(start * way).sum(axis=-1) / square, 0.0, 1.0)
             nearest = start + share[..., None] * way
-            first, last, least = (np.linalg.norm(x, axis=-1) for x in (start, end, nearest))
+            first, last, least = (norm(x, axis=-1) for x in (start, end, nearest))
             return (least < core) & (first >= core) & (last >= core)
         before, after = (at @ self.normals.T - self.offsets for at in (before, after))
         before += arc[..., None]

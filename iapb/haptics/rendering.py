@@ -20,8 +20,15 @@ from iapb.mechanics.kernels.dynamics import bias, mass_matrix
 from iapb.mechanics.kernels.free_motion import RIGID, FreeMotion, move_simple_trees
 from iapb.mechanics.kernels.kinematics import add_point_force, forward_kinematics
 from iapb.numerics.compiled import copy_into, kernel
-from iapb.numerics.linalg import cholesky, dot, load, placed, solve_mass
-from iapb.numerics.schema import Booleans, Floats, Integers
+from iapb.numerics.linalg import cholesky, dot, load, placed, solve_mass, three
+from iapb.numerics.schema import (
+    Booleans,
+    FloatPerTool,
+    FloatPerVelocity,
+    Floats,
+    Integers,
+    SingleInteger,
+)
 from iapb.run import FREE
 
 NO_COUPLING = 0
@@ -47,22 +54,22 @@ class Port(NamedTuple):
     wrench: Annotated[Floats, "6"]  # force [N] and torque [N m] of the hand, world axes
     # the wrench of the coming steps; empty: it does not change
     planned: Annotated[Floats, "planned 6"]
-    stiffness: Annotated[Floats, "tool"]  # K [N/m, N m/rad]
-    damping: Annotated[Floats, "tool"]  # B [N s/m, N m s/rad]
+    stiffness: FloatPerTool  # K [N/m, N m/rad]
+    damping: FloatPerTool  # B [N s/m, N m s/rad]
     mechanism: MechanismArrays  # the device: kinematically the tool
     body: Workspace
     varying_inertia: bool
     free: FreeMotion  # of the device alone
     trees: Annotated[Integers, "tool_body"]  # zeros: the device is one tree
     device_q: Annotated[Floats, "tool_coordinate"]
-    device_v: Annotated[Floats, "tool"]
+    device_v: FloatPerTool
     device_mass: Annotated[Floats, "tool tool"]
     device_lower: Annotated[Floats, "tool tool"]
-    device_damping: Annotated[Floats, "tool"]  # physical damping b of the device
+    device_damping: FloatPerTool  # physical damping b of the device
     # [N, N m] to which the actuators clip the commanded force, inf = none
-    force_limit: Annotated[Floats, "tool"]
+    force_limit: FloatPerTool
     # [m, rad] of the position sensors, in the tangent where q is no vector
-    resolution: Annotated[Floats, "tool"]
+    resolution: FloatPerTool
     quantised: bool
     # ring of actuator forces on their way; one slot: no delay
     delayed_force: Annotated[Floats, "slot tool"]
@@ -71,17 +78,17 @@ class Port(NamedTuple):
     sensed_q: Annotated[Floats, "tool_coordinate"]  # positions read by the sensors
     # position of the device as the simulation reads it
     measured_q: Annotated[Floats, "tool_coordinate"]
-    measured_v: Annotated[Floats, "tool"]
-    hand_force: Annotated[Floats, "velocity"]  # of the hand on the tool
-    device_hand_force: Annotated[Floats, "tool"]  # of the hand on the device
-    coupling_force: Annotated[Floats, "velocity"]  # on the tool
-    environment_force: Annotated[Floats, "velocity"]  # F_env (26)
-    device_force: Annotated[Floats, "tool"]  # of the actuators on the device
-    applied: Annotated[Floats, "velocity"]  # sum of hand and coupling force
-    error: Annotated[Floats, "tool"]  # scratch
-    acceleration: Annotated[Floats, "tool"]  # scratch
+    measured_v: FloatPerTool
+    hand_force: FloatPerVelocity  # of the hand on the tool
+    device_hand_force: FloatPerTool  # of the hand on the device
+    coupling_force: FloatPerVelocity  # on the tool
+    environment_force: FloatPerVelocity  # F_env (26)
+    device_force: FloatPerTool  # of the actuators on the device
+    applied: FloatPerVelocity  # sum of hand and coupling force
+    error: FloatPerTool  # scratch
+    acceleration: FloatPerTool  # scratch
     engaged: Annotated[Booleans, "1"]  # the unilateral coupler is on
-    clock: Annotated[Integers, "1"]  # steps done
+    clock: SingleInteger  # steps done
 
 
 # Measurement of the device: quantised sensors and delay.
@@ -91,7 +98,7 @@ class Port(NamedTuple):
 def measure(world, port):
     """Write the state of the device as the simulation reads it: quantised by the sensors, and
     delayed."""
-    slots = port.delayed_q.shape[0]
+    slots = len(port.delayed_q)
     now = port.clock[0] % slots
     # nothing older than the start
     arriving = (port.clock[0] + 1) % slots if port.clock[0] + 1 >= slots else 0
@@ -116,7 +123,7 @@ def sense(world, port, velocity):
     first = port.clock[0] == 0
     m = port.mechanism
     difference(m, port.sensed_q, port.device_q, port.error)
-    for b in range(m.kind.shape[0]):
+    for b in range(len(m.kind)):
         i = m.q_start[b]
         k = m.v_start[b]
         vector = is_vector(m.kind[b])
@@ -149,7 +156,7 @@ def couple(world, state, port):
         return  # `applied` holds the zeros that it was made with
     port.hand_force[:] = port.device_hand_force[:] = 0.0
     pushing = False
-    for k in range(port.wrench.shape[0]):
+    for k in range(len(port.wrench)):
         pushing = pushing or port.wrench[k] != 0.0
     if pushing:
         forward_kinematics(world.mechanism, state.q, state.body)
@@ -160,7 +167,7 @@ def couple(world, state, port):
     if port.coupling != NO_COUPLING:
         measure(world, port)
         coordinate(state, port)
-    for k in range(port.applied.shape[0]):
+    for k in range(len(port.applied)):
         port.applied[k] = port.hand_force[k] + port.coupling_force[k]
     if port.coupling == UNILATERAL and port.engaged[0]:
         # the hand reaches a coupled tool through the coupler only
@@ -171,12 +178,9 @@ def couple(world, state, port):
 @kernel
 def press(mechanism, body, held, port, out):
     """Add J_hᵀF_h of the wrench at the held point to `out`."""
-    wrench = port.wrench
-    arm = port.hand_point
-    force = (wrench[0], wrench[1], wrench[2])
-    torque = (wrench[3], wrench[4], wrench[5])
-    point = placed(body, held, (arm[0], arm[1], arm[2]))
-    add_point_force(mechanism, body, held, point, force, out)
+    torque = three(port.wrench, 3)
+    point = placed(body, held, three(port.hand_point, 0))
+    add_point_force(mechanism, body, held, point, three(port.wrench, 0), out)
     k = mechanism.last_dof[held]
     while k >= 0:
         if mechanism.dof_rotates[k]:
@@ -191,7 +195,7 @@ def coordinate(state, port):
     if port.coupling == UNILATERAL and not port.engaged[0]:
         return
     difference(port.mechanism, state.q[port.q_start : port.q_stop], port.measured_q, port.error)
-    for i in range(port.error.shape[0]):
+    for i in range(len(port.error)):
         k = port.v_start + i
         rate = port.measured_v[i] - state.v[k]
         port.coupling_force[k] = port.stiffness[i] * port.error[i] + port.damping[i] * rate
@@ -204,21 +208,15 @@ def coordinate(state, port):
 @kernel
 def render(world, state, port):
     """Write F_env (26) of this step, and the actuator force that renders it."""
-    for k in range(port.environment_force.shape[0]):
+    for k in range(len(port.environment_force)):
         contact = state.penalty_force[k] + state.friction_force[k]
         port.environment_force[k] = contact + state.impulse[k] / world.dt
     if port.coupling == NO_COUPLING:
         return
-    command(port)
-
-
-@kernel
-def command(port):
-    """Write the actuator force: F_env (four-channel only) minus the PD, clipped to the device's
-    limits and delayed."""
-    slots = port.delayed_force.shape[0]
+    # F_env (four-channel only) minus the PD, clipped to the device's limits and delayed
+    slots = len(port.delayed_force)
     now = port.clock[0] % slots
-    for i in range(port.device_force.shape[0]):
+    for i in range(len(port.device_force)):
         k = port.v_start + i
         force = (
             port.environment_force[k] if port.coupling == FOUR_CHANNEL else 0.0
@@ -235,7 +233,7 @@ def move_device(world, state, port):
     A free body as device keeps its momentum, as the tool does, where the world's integrator does.
     """
     a = port.acceleration
-    for i in range(a.shape[0]):
+    for i in range(len(a)):
         a[i] = (
             port.device_hand_force[i]
             + port.device_force[i]
@@ -247,10 +245,10 @@ def move_device(world, state, port):
         mass_matrix(port.mechanism, port.body, port.device_mass)
         finite = cholesky(port.device_mass, port.device_lower) == 0
         bias(port.mechanism, port.body, port.device_v, port.error)
-        for i in range(a.shape[0]):
+        for i in range(len(a)):
             a[i] -= port.error[i]
     solve_mass(port.device_lower, a, a)
-    for i in range(a.shape[0]):
+    for i in range(len(a)):
         port.device_v[i] += world.dt * a[i]
         finite = finite and abs(port.device_v[i]) < LARGEST_SPEED
     if world.conserving and port.free.kind[0] == RIGID:

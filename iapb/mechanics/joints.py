@@ -8,7 +8,6 @@ that a free planar body has a constant mass matrix.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -17,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iapb.errors import ArgumentError
+from iapb.mechanics.rotations import unit
 from iapb.names import one_of
 
 # Codes of the kinds in the kernels.
@@ -102,11 +102,8 @@ class Joint:
 
     @property
     def unit_axis(self) -> NDArray[np.float64]:
-        """The axis with length one; scaled first, so that tiny axes do not vanish and huge axes do
-        not overflow."""
-        axis = np.asarray(self.axis, dtype=np.float64)
-        axis = axis / np.abs(axis).max()
-        return axis / math.sqrt(sum(x * x for x in axis.tolist()))
+        """The axis with length one."""
+        return unit(self.axis)
 
 
 class Mimic(NamedTuple):

@@ -2,12 +2,29 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from iapb.numerics.elementary import arc_tangent, hypotenuse, sine_cosine
 from iapb.numerics.schema import Floats
+
+
+def unit(vector: ArrayLike) -> Floats:
+    """Return a vector (3,) with length one; scaled first, so that a tiny one does not vanish and a
+    huge one does not overflow."""
+    scaled = np.asarray(vector, np.float64) / np.abs(vector).max()
+    return scaled / math.sqrt(sum(x * x for x in scaled.tolist()))
+
+
+def frame_along(normal: ArrayLike) -> Floats:
+    """Return right-handed axes (columns); the third axis points along `normal` (longer than 0)."""
+    z = unit(normal)
+    x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
+    x = x / math.sqrt(sum(y * y for y in x.tolist()))
+    return np.column_stack([x, np.cross(z, x), z])
 
 
 def rotation_of(rpy: Any) -> Floats:

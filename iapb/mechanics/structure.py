@@ -20,7 +20,7 @@ from iapb.mechanics.joints import FREE_FLYER, PLANAR, SPHERICAL, Mimic
 from iapb.mechanics.kernels.arrays import MechanismArrays
 from iapb.mechanics.kernels.free_motion import LINKAGE, RIGID, STRAIGHT, FreeMotion
 from iapb.numerics.linalg import product
-from iapb.numerics.schema import Floats, Integers
+from iapb.numerics.schema import Floats, Integers, zeros_of
 
 
 def collect_arrays(bodies: tuple[Body, ...], parents: list[int]) -> MechanismArrays:
@@ -204,16 +204,9 @@ def make_free_motion(m: MechanismArrays, tree_of_body: Integers) -> FreeMotion:
     """Return the constants of `iapb.mechanics.kernels.free_motion` for the trees, given as the tree
     of each body."""
     count = 1 + tree_of_body.max()
-    found = FreeMotion(
-        np.zeros(count, np.int64),
-        np.full(count, -1, np.int64),
-        np.zeros(count, np.int64),
-        np.zeros((count, 3)),
-        np.zeros((count, 3, 3)),
-        np.ones((count, 3)),
-        False,
-        False,
-    )
+    found = zeros_of(FreeMotion, tree=count)
+    found.root[:] = -1
+    found.moments[:] = 1.0
     parts = moving_parts(m)
     carriers = np.flatnonzero(m.v_count)
     for t in range(count):

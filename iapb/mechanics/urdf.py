@@ -28,7 +28,7 @@ import numpy as np
 from iapb.errors import ArgumentError, counted
 from iapb.mechanics.bodies import Body
 from iapb.mechanics.joints import Joint, Mimic
-from iapb.mechanics.rotations import rotation_of
+from iapb.mechanics.rotations import frame_along, rotation_of
 from iapb.mechanics.structure import turned_inertia
 from iapb.names import bytes_of, one_of
 from iapb.numerics.linalg import product
@@ -200,7 +200,7 @@ def _with_plane(link: Link) -> list[Link]:
     body = link.body
     if body.joint.kind != "planar" or body.joint.axis == (0.0, 0.0, 1.0):
         return [link]
-    turn = _to_axis(body.joint.unit_axis)
+    turn = frame_along(body.joint.axis)
     rotation, position = body.placement
     frame = Body(
         f"{body.name}_plane", body.parent, Joint("planar"), (product(rotation, turn), position)
@@ -208,14 +208,6 @@ def _with_plane(link: Link) -> list[Link]:
     inertial = body.mass, body.center_of_mass, body.inertia
     fixed = Body(body.name, frame.name, Joint("fixed"), (turn.T + 0.0, np.zeros(3)), *inertial)
     return [link._replace(body=frame), Link(fixed)]
-
-
-def _to_axis(axis: Floats) -> Floats:
-    """Return a rotation matrix whose third column is the unit axis."""
-    across = np.eye(3)[int(np.argmin(np.abs(axis)))]
-    first = np.cross(across, axis)
-    first /= np.sqrt((first * first).sum())
-    return np.column_stack([first, np.cross(axis, first), axis])
 
 
 def _link(

@@ -83,7 +83,7 @@ class Entry:
 def copy_into(target, source):
     """Do target[:] = source for vectors of equal length; a slice assignment might make a hidden
     copy."""
-    for k in range(target.shape[0]):
+    for k in range(len(target)):
         target[k] = source[k]
 
 

@@ -30,4 +30,4 @@ def line_copier(listed: Iterable[Quantity]) -> Any:
 def _made(arguments: str, lines: list[str]) -> Any:
     scope = {"__name__": __name__, "copy_into": copy_into, "load": load, "store": store}
     exec(f"def copy({arguments}):\n " + "\n ".join(lines), scope)
-    return kernel(scope["copy"])  # type: ignore[arg-type]
+    return kernel(scope["copy"])

@@ -8,7 +8,7 @@ long as no intermediate value leaves the range of doubles; callers scale first
 
 from __future__ import annotations
 
-import math
+from math import frexp, ldexp
 
 from iapb.numerics.compiled import kernel
 
@@ -62,7 +62,7 @@ def symmetric_entry(matrix, i, j):
 def row_times(matrix, i, v, unit=1.0):
     """Return row i of the symmetric part of a matrix times unit · v, as a pair."""
     high = low = 0.0
-    for j in range(v.shape[0]):
+    for j in range(len(v)):
         entry, rest = symmetric_entry(matrix, i, j)
         high, low = add_product(high, low, entry, rest, unit * v[j])
     return high, low
@@ -75,7 +75,7 @@ def quadratic_forms(mass_matrix, v, change, v_unit=1.0, change_unit=1.0):
 
     v and Δv are first scaled by their units, which are powers of two.
     """
-    d = v.shape[0]
+    d = len(v)
     cross_hi = cross_lo = square_hi = square_lo = 0.0
     for i in range(d):
         row_hi, row_lo = row_times(mass_matrix, i, change, change_unit)
@@ -93,7 +93,7 @@ def unit_of(vector):
     largest = 0.0
     for entry in vector:
         largest = max(largest, abs(entry))
-    return math.ldexp(1.0, min(1000, max(-1000, -math.frexp(largest)[1])))
+    return ldexp(1.0, min(1000, max(-1000, -frexp(largest)[1])))
 
 
 @kernel
@@ -117,7 +117,7 @@ def kinetic_energies(mass_matrix, v_minus, v_plus):
     all digits.
     """
     before_hi = before_lo = change_hi = change_lo = 0.0
-    for i in range(v_minus.shape[0]):
+    for i in range(len(v_minus)):
         minus_hi, minus_lo = row_times(mass_matrix, i, v_minus)
         plus_hi, plus_lo = row_times(mass_matrix, i, v_plus)
         before_hi, before_lo = add_product(before_hi, before_lo, minus_hi, minus_lo, v_minus[i])

@@ -9,7 +9,7 @@ correctly rounded.
 
 from __future__ import annotations
 
-import math
+from math import copysign, floor, isfinite, nan, sqrt
 
 from iapb.numerics.compiled import kernel
 from iapb.numerics.double_double import add_product, two_product, two_sum
@@ -73,8 +73,8 @@ def _reduced(angle):
     number."""
     if not abs(angle) <= _LARGEST_ANGLE:
         # the rounded 2π changes the angle by less than its own rounding error
-        angle = math.copysign(abs(angle) % (4.0 * _QUARTER[0]), angle)
-    turns = math.floor(angle / _QUARTER[0] + 0.5) if abs(angle) > 0.5 * _QUARTER[0] else 0
+        angle = copysign(abs(angle) % (4.0 * _QUARTER[0]), angle)
+    turns = floor(angle / _QUARTER[0] + 0.5) if abs(angle) > 0.5 * _QUARTER[0] else 0
     h = angle
     l = 0.0
     if turns != 0:
@@ -134,8 +134,8 @@ def _quickly(h, l):
 @kernel
 def sine_cosine(angle):
     """Return (sin, cos) of an angle [rad]; NaN for an angle that is not finite."""
-    if not math.isfinite(angle):
-        return math.nan, math.nan
+    if not isfinite(angle):
+        return nan, nan
     h, l, turns = _reduced(angle)
     s, c, sure = _quickly(h, l)
     if not sure:
@@ -170,7 +170,7 @@ def arc_tangent(y, x):
     # tangent of half the angle from the nearer axis, at most tan 22.5°
     small = min(across, along) / max(across, along)
     large = 1.0
-    small = small / (1.0 + math.sqrt(1.0 + small * small))
+    small = small / (1.0 + sqrt(1.0 + small * small))
     square = small * small
     series = 0.0
     for n in range(_TAN_22_5_DEGREES_TERMS, -1, -1):
@@ -180,7 +180,7 @@ def arc_tangent(y, x):
         first = _QUARTER[0] - first
     if x < 0.0:
         first = 2.0 * _QUARTER[0] - first
-    first = math.copysign(first, y)
+    first = copysign(first, y)
     s, t, c, d = _sine_cosine_pairs(first)
     scale = _power_of_two(max(across, along))
     rise = scale * y
@@ -194,14 +194,14 @@ def arc_tangent(y, x):
 def hypotenuse(x, y):
     """Return √(x² + y²), as math.hypot does, without intermediate overflow or underflow."""
     largest = max(abs(x), abs(y))
-    if not (largest > 0.0 and math.isfinite(largest)):
+    if not (largest > 0.0 and isfinite(largest)):
         return largest + abs(x) + abs(y)
     scale = _power_of_two(largest)
     x = scale * x
     y = scale * y
     square, rest = two_product(x, x)
     square, rest = add_product(square, rest, y, 0.0, y)
-    root = math.sqrt(square)
+    root = sqrt(square)
     p, r = two_product(root, root)
     s, t = two_sum(square, -p)
     return (root + (s + (t + (rest - r))) / (2.0 * root)) / scale

@@ -7,7 +7,7 @@ Kernels carry no type hints; numba infers them.
 
 from __future__ import annotations
 
-import math
+from math import isfinite, sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 from iapb.numerics.compiled import kernel
 
 # 3-vectors, rows of (n, 3) arrays, and frames (n, 3, 3): rotations with the axes as columns.
+
+
+ZERO = (0.0, 0.0, 0.0)
 
 
 @kernel
@@ -26,10 +29,21 @@ def load(rows, i):
 @kernel
 def store(rows, i, a):
     """Write a into row i of an (n, 3) array; the address of the row is computed once."""
-    row = rows[i]
-    row[0] = a[0]
-    row[1] = a[1]
-    row[2] = a[2]
+    put(rows[i], 0, a)
+
+
+@kernel
+def three(v, k):
+    """Entries k to k + 2 of a vector."""
+    return (v[k], v[k + 1], v[k + 2])
+
+
+@kernel
+def put(v, k, a):
+    """Write a into entries k to k + 2 of a vector."""
+    v[k] = a[0]
+    v[k + 1] = a[1]
+    v[k + 2] = a[2]
 
 
 @kernel
@@ -57,6 +71,12 @@ def scale(s, a):
 
 
 @kernel
+def divide(a, s):
+    """a / s."""
+    return (a[0] / s, a[1] / s, a[2] / s)
+
+
+@kernel
 def dot(a, b):
     """a . b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
@@ -65,7 +85,7 @@ def dot(a, b):
 @kernel
 def norm(a):
     """|a|."""
-    return math.sqrt(dot(a, a))
+    return sqrt(dot(a, a))
 
 
 @kernel
@@ -127,7 +147,7 @@ def turn_frame(frames, i, x, y, z):
 def dot_of(a, b):
     """Return a · b over the length of b."""
     total = 0.0
-    for k in range(b.shape[0]):
+    for k in range(len(b)):
         total += a[k] * b[k]
     return total
 
@@ -135,23 +155,46 @@ def dot_of(a, b):
 @kernel
 def norm_of(a):
     """Return the Euclidean length of a vector."""
-    return math.sqrt(dot_of(a, a))
+    return sqrt(dot_of(a, a))
 
 
 @kernel
 def all_finite(vector):
     """Return whether a vector has no NaN and no infinity."""
     sound = True
-    for k in range(vector.shape[0]):
-        sound = sound and math.isfinite(vector[k])
+    for k in range(len(vector)):
+        sound = sound and isfinite(vector[k])
     return sound
 
 
 @kernel
 def add_multiple(vector, factor, row):
     """Do vector += factor · row over the length of the vector."""
-    for k in range(vector.shape[0]):
+    for k in range(len(vector)):
         vector[k] += factor * row[k]
+
+
+@kernel
+def multiply_by(vector, factor):
+    """Do vector *= factor."""
+    for k in range(len(vector)):
+        vector[k] *= factor
+
+
+@kernel
+def write_difference(out, a, b):
+    """Write a − b over the length of `out`."""
+    for k in range(len(out)):
+        out[k] = a[k] - b[k]
+
+
+@kernel
+def equal(a, b):
+    """Return whether two vectors are equal over the length of a."""
+    same = True
+    for k in range(len(a)):
+        same = same and a[k] == b[k]
+    return same
 
 
 @kernel
@@ -177,14 +220,14 @@ def orthogonalize(row, basis, count, overlaps):
 @kernel
 def cholesky(mass_matrix, lower):
     """Write L with M = L Lᵀ into `lower`; return 0, or k + 1 if the k-th pivot is not positive."""
-    d = mass_matrix.shape[0]
+    d = len(mass_matrix)
     for k in range(d):
         pivot = mass_matrix[k, k]
         for j in range(k):
             pivot -= lower[k, j] * lower[k, j]
         if not pivot > 0.0:
             return k + 1
-        root = math.sqrt(pivot)
+        root = sqrt(pivot)
         lower[k, k] = root
         for i in range(k + 1, d):
             entry = mass_matrix[i, k]
@@ -199,7 +242,7 @@ def cholesky(mass_matrix, lower):
 def cholesky_tree_blocks(matrix, start, stop, lower):
     """Do `cholesky` for each block of a block diagonal M; other entries of `lower` stay; return 0,
     or 1 on failure."""
-    for t in range(start.shape[0]):
+    for t in range(len(start)):
         i = start[t]
         j = stop[t]
         if cholesky(matrix[i:j, i:j], lower[i:j, i:j]) != 0:
@@ -210,7 +253,7 @@ def cholesky_tree_blocks(matrix, start, stop, lower):
 @kernel
 def to_whitened(lower, v, u):
     """Write the whitened velocity u = Lᵀ v, so that KE = ½|u|²."""
-    d = v.shape[0]
+    d = len(v)
     for k in range(d):
         total = 0.0
         for i in range(k, d):
@@ -221,7 +264,7 @@ def to_whitened(lower, v, u):
 @kernel
 def from_whitened(lower, u, v):
     """Solve Lᵀ v = u (back substitution)."""
-    d = u.shape[0]
+    d = len(u)
     for k in range(d - 1, -1, -1):
         total = u[k]
         for i in range(k + 1, d):
@@ -232,7 +275,7 @@ def from_whitened(lower, u, v):
 @kernel
 def to_momentum(lower, u, momentum):
     """Write the generalized momentum L u."""
-    for k in range(u.shape[0]):
+    for k in range(len(u)):
         momentum[k] = dot_of(lower[k], u[: k + 1])
 
 
@@ -244,7 +287,7 @@ def whiten_columns(lower, columns, count):
     One contact is one column, so the inner loops run over contacts: they are contiguous and
     vectorize without reordering any sum.
     """
-    d = lower.shape[0]
+    d = len(lower)
     for k in range(d):
         for j in range(k):
             factor = lower[k, j]
@@ -266,7 +309,7 @@ def solve_mass(lower, force, acceleration):
     divisions, since they do not depend on the sum. In the back substitution the entry that was
     computed last comes last in the sum.
     """
-    d = force.shape[0]
+    d = len(force)
     for k in range(d):
         total = force[k]
         for j in range(k):
@@ -287,7 +330,7 @@ def solve_mass(lower, force, acceleration):
 def solve_tree_blocks(lower, start, stop, force, acceleration):
     """Do `solve_mass` for a block diagonal M, tree by tree: linear in the number of trees, with the
     same bits."""
-    for t in range(start.shape[0]):
+    for t in range(len(start)):
         i = start[t]
         j = stop[t]
         solve_mass(lower[i:j, i:j], force[i:j], acceleration[i:j])
@@ -301,13 +344,13 @@ def product(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
     left = np.ascontiguousarray(a, np.float64)
     right = np.asarray(b, np.float64)
     columns = np.ascontiguousarray(right if right.ndim == 2 else right[:, None])
-    out = np.empty((left.shape[0], columns.shape[1]))
+    out = np.empty((len(left), columns.shape[1]))
     _multiply(left, columns, out)
     return out if right.ndim == 2 else out[:, 0]
 
 
 @kernel
 def _multiply(a, b, out):
-    for i in range(a.shape[0]):
+    for i in range(len(a)):
         for j in range(b.shape[1]):
             out[i, j] = dot_of(a[i], b[:, j])

@@ -1,8 +1,8 @@
 """The schema of recorded quantities and of the kernels' arrays: each is declared once, as a field
 of its record.
 
-A field ``name: Annotated[Floats, quantity("step velocity", FORCE, "friction forces")]`` gives an
-array its name, type, dimensions, unit and meaning. Arrays that are not recorded give the dimensions
+A field ``name: Annotated[Floats, "step velocity", FORCE, "friction forces"]`` gives an array its
+name, type, dimensions, unit and meaning. Arrays that are not recorded give the dimensions
 alone: ``Annotated[Floats, "velocity"]``.
 """
 
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache
-from typing import Any, NamedTuple, TypeVar, get_args, get_type_hints
+from typing import Annotated, Any, NamedTuple, TypeVar, get_args, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,23 @@ Indices = NDArray[np.int32]
 Booleans = NDArray[np.bool_]
 States = NDArray[np.int8]
 Record = TypeVar("Record")
+
+# arrays of the kernels' records, by their dimensions
+FloatPerVelocity = Annotated[Floats, "velocity"]
+FloatPerRow = Annotated[Floats, "row"]
+FloatPerTool = Annotated[Floats, "tool"]
+FloatPerContact = Annotated[Floats, "contact"]
+FloatPerCoordinate = Annotated[Floats, "coordinate"]
+VectorPerContact = Annotated[Floats, "contact 3"]
+VectorPerBody = Annotated[Floats, "body 3"]
+VelocityMatrix = Annotated[Floats, "velocity velocity"]
+FlagPerTree = Annotated[Booleans, "tree"]
+FlagPerContact = Annotated[Booleans, "contact"]
+NumberPerTree = Annotated[Integers, "tree"]
+NumberPerVelocity = Annotated[Integers, "velocity"]
+IndexPerContact = Annotated[Indices, "contact"]
+SingleFloat = Annotated[Floats, "1"]
+SingleInteger = Annotated[Integers, "1"]
 
 _hints: Callable[..., dict[str, Any]] = cache(get_type_hints)  # 0.3 ms for the state of a world
 
@@ -39,11 +56,6 @@ class Quantity(NamedTuple):
     meaning: str
 
 
-def quantity(dimensions: str, unit: str | dict[str, str] = "1", meaning: str = "") -> Quantity:
-    """Return the declaration of an array, for `Annotated`; the field adds name and type."""
-    return Quantity("", tuple(dimensions.split()), float, unit, meaning)
-
-
 def quantities(record: type, first: str = "") -> tuple[Quantity, ...]:
     """Return the arrays of a record class in order; if `first` is given, only those along this
     dimension."""
@@ -54,14 +66,16 @@ def quantities(record: type, first: str = "") -> tuple[Quantity, ...]:
 
 @cache
 def _declared(record: Any) -> tuple[Quantity, ...]:
-    hints = get_type_hints(record, include_extras=True)
-    found = (
-        (name, *get_args(hint)) for name, hint in hints.items() if hasattr(hint, "__metadata__")
-    )
+    hints = get_type_hints(record, include_extras=True).items()
     return tuple(
-        (quantity(said) if isinstance(said, str) else said)._replace(name=name, dtype=_dtype(kind))
-        for name, kind, said in found
+        _quantity(name, *get_args(hint)) for name, hint in hints if hasattr(hint, "__metadata__")
     )
+
+
+def _quantity(
+    name: str, kind: Any, dimensions: str, unit: Any = "1", meaning: str = ""
+) -> Quantity:
+    return Quantity(name, tuple(dimensions.split()), _dtype(kind), unit, meaning)
 
 
 def _dtype(kind: Any) -> type:

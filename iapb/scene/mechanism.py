@@ -15,14 +15,14 @@ import numpy as np
 
 from iapb.contact import geometry
 from iapb.contact.finding import ContactFinder
-from iapb.contact.geometry import Shapes, candidate_pairs, frame_along, make_shapes
+from iapb.contact.geometry import Shapes, candidate_pairs, make_shapes
 from iapb.contact.kernels.contact_set import TOUCHING
 from iapb.contact.kernels.world import Stops
 from iapb.errors import ArgumentError
 from iapb.mechanics.bodies import Body
 from iapb.mechanics.joints import Joint, Mimic, ranges_of
 from iapb.mechanics.mechanism import Mechanism
-from iapb.mechanics.rotations import rotation_of
+from iapb.mechanics.rotations import frame_along, rotation_of
 from iapb.mechanics.structure import carriers
 from iapb.numerics.linalg import product
 from iapb.numerics.schema import Booleans, Floats, Indices, Integers
@@ -164,22 +164,13 @@ def gravity_of(scene: Scene) -> Floats:
     return in_space(scene.gravity or (0.0, 0.0))
 
 
-def joint_damping_of(scene: Scene, mechanism: Mechanism) -> Floats:
-    """Return the viscous damping (nv,) of each velocity [N s/m, N m s/rad]."""
-    return _by_velocity(mechanism, [body.joint_damping for body in scene.bodies], 2)
-
-
-def joint_friction_of(scene: Scene, mechanism: Mechanism) -> Floats:
-    """Return the dry friction (nv,) of each velocity [N, N m]."""
-    return _by_velocity(mechanism, [body.joint_friction for body in scene.bodies], 1)
-
-
-def _by_velocity(mechanism: Mechanism, given: list[tuple[float, ...]], power: int) -> Floats:
-    """Return what the joints of the bodies have, by velocity. A joint that follows another one adds
-    its own to that of the leader, times a power of the multiplier."""
+def of_joints(scene: Scene, mechanism: Mechanism, field: str, power: int) -> Floats:
+    """Return a field of the joints of the bodies, by velocity (nv,). A joint that follows another
+    one adds its own to that of the leader, times a power of the multiplier."""
     m = mechanism.arrays
     own = np.zeros(mechanism.motions)
-    for start, values in zip(m.v_start.tolist(), given, strict=True):
+    for start, body in zip(m.v_start.tolist(), scene.bodies, strict=True):
+        values = getattr(body, field)
         own[start : start + len(values)] = values
     found = np.zeros(mechanism.nv)
     np.add.at(found, m.dof_leader, np.abs(m.dof_ratio) ** power * own)

@@ -12,7 +12,7 @@ broad phase.
 
 from __future__ import annotations
 
-import math
+from math import floor, hypot, inf
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -88,12 +88,12 @@ def bounding_sphere(shapes: Shapes, i: int) -> tuple[Any, float]:
     for others."""
     if shapes.kind[i] != POLYGON:
         endless = shapes.kind[i] in ENDLESS
-        return shapes.center[i], math.inf if endless else float(shapes.radius[i]) + math.hypot(
+        return shapes.center[i], inf if endless else float(shapes.radius[i]) + hypot(
             *shapes.half_size[i]
         )
     corners = shapes.vertices[shapes.first[i] : shapes.first[i] + shapes.count[i]]
     middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
-    return [*middle, 0.0], max(math.hypot(*corner) for corner in corners - middle)
+    return [*middle, 0.0], max(hypot(*corner) for corner in corners - middle)
 
 
 LARGEST_CELL = 2**40  # cell number of distant coordinates; int64 holds this cell and its neighbours
@@ -106,11 +106,11 @@ def near_pairs(broad, w, margin):
     width = broad.cell_size + margin
     count = 0
     broad.first[:] = -1
-    for m in range(broad.moving.shape[0]):
+    for m in range(len(broad.moving)):
         i = broad.moving[m]
         store(broad.center, i, placed(w, broad.body[i], load(broad.local_center, i)))
         for axis in range(3):
-            number = math.floor(broad.center[i, axis] / width)  # may be infinite or not a number
+            number = floor(broad.center[i, axis] / width)  # may be infinite or not a number
             broad.cell[m, axis] = int(number) if abs(number) < LARGEST_CELL else LARGEST_CELL
         for neighbour in range(broad.neighbours):
             x = broad.cell[m, 0] + neighbour % 3 - 1
@@ -128,8 +128,8 @@ def near_pairs(broad, w, margin):
             count = keep_pair(broad, i, j, margin, count)
     sort_keys(broad.key, count)
     for k in range(count):
-        i = broad.key[k] // broad.radius.shape[0]
-        j = broad.key[k] % broad.radius.shape[0]
+        i = broad.key[k] // len(broad.radius)
+        j = broad.key[k] % len(broad.radius)
         first = 0 if broad.allowed[i, j] == 1 else 1
         broad.pairs[k, first] = i
         broad.pairs[k, 1 - first] = j
@@ -140,7 +140,7 @@ def near_pairs(broad, w, margin):
 def bucket_of(broad, x, y, z):
     """Return the bucket of a cell, of 2ⁿ buckets, by a hash with three primes (Teschner et al.,
     2003)."""
-    return ((x * 73856093) ^ (y * 19349663) ^ (z * 83492791)) & (broad.first.shape[0] - 1)
+    return ((x * 73856093) ^ (y * 19349663) ^ (z * 83492791)) & (len(broad.first) - 1)
 
 
 @kernel
@@ -155,9 +155,9 @@ def keep_pair(broad, i, j, margin, count):
     apart = subtract(load(broad.center, i), load(broad.center, j))
     if dot(apart, apart) > reach * reach:
         return count
-    if not 0 <= count < broad.key.shape[0]:
+    if not 0 <= count < len(broad.key):
         return -1
-    broad.key[count] = i * broad.radius.shape[0] + j
+    broad.key[count] = i * len(broad.radius) + j
     return count + 1
 
 

@@ -26,7 +26,7 @@ from iapb.contact.kernels.rows import (
 from iapb.contact.kernels.shape_frames import copy_geometry
 from iapb.contact.kernels.unilateral import poisson_impact
 from iapb.numerics.compiled import copy_into, kernel
-from iapb.numerics.linalg import load, norm_of
+from iapb.numerics.linalg import equal, load, norm_of, write_difference
 from iapb.run import COLLIDING
 
 # share of |u|, and of the largest impulse, above which a contact opens or pulls: far above rounding
@@ -43,7 +43,7 @@ def gather_group(world, state, island):
     size = 0
     dofs = state.dofs
     work = state.work
-    for t in range(world.tree_start.shape[0]):
+    for t in range(world.trees):
         if state.island_of_tree[t] == island:
             for k in range(world.tree_start[t], world.tree_stop[t]):
                 dofs[size] = k
@@ -114,13 +114,10 @@ def apply_group(state, size, share):
     v = work.v[:size]
     change = work.v_change[:size]
     after = work.shifted[:size]
-    for i in range(size):
-        change[i] = work.v_plus[i] - v[i]
+    write_difference(change, work.v_plus, v)
     write_step(v, change, share, after)
-    certain = share == 1.0  # the velocity that the resolver has accepted
-    for i in range(size):
-        certain = certain and after[i] == work.v_plus[i]
-    if not certain:
+    # else it is the velocity that the resolver has accepted
+    if share != 1.0 or not equal(after, work.v_plus):
         share = passive_step(work.mass, v, change, share, after)
     lost = 0.0
     for i in range(size):
@@ -176,7 +173,7 @@ def gather_tangents(world, state, size, count):
     """Write μ of each contact and the tangents' rows of J."""
     contacts = state.contacts
     f = state.friction_work
-    tangents = f.velocity.shape[0]
+    tangents = len(f.velocity)
     for r in range(count):
         i = state.rows[r]
         f.coefficient[r] = friction_of(world, contacts, i)
@@ -238,7 +235,7 @@ def push_with_friction(world, state, size, count, smallest, tolerance):
     share, factor, met = add_friction_to_impact(world, state, size, together, rank, solved)
     state.row_impulse[together:count] = 0.0
     if solved and not met:
-        f.p[together * f.velocity.shape[0] : count * f.velocity.shape[0]] = 0.0
+        f.p[together * len(f.velocity) : count * len(f.velocity)] = 0.0
         gather_tangents(world, state, size, count)
         swept, met = sweep_impact(size, count, work, f, state.row_impulse)
         if met:
@@ -304,7 +301,7 @@ def resolve_island(world, state, island):
     if world.switches.impulse_limit:
         share = largest_share(work.momentum, state.dofs, size, world.dt, world.impulse_limit)
     if world.switches.spreading:
-        for t in range(world.tree_start.shape[0]):
+        for t in range(world.trees):
             if state.island_of_tree[t] == island:
                 state.spreading[t] = share < 1.0
     lost, applied = apply_group(state, size, share)
@@ -354,7 +351,7 @@ def resolve_collisions(world, state):
     add_supports(world, state)
     collide = find_islands(world, state)
     while collide:
-        for t in range(world.tree_start.shape[0]):
+        for t in range(world.trees):
             if state.collides_of_tree[t]:
                 resolve_island(world, state, t)
         collide = strike_again(world, state)
@@ -404,9 +401,9 @@ def strike_again(world, state):
         return False
     find_islands(world, state)
     islands = 0
-    for t in range(world.tree_start.shape[0]):
+    for t in range(world.trees):
         islands += state.collides_of_tree[t]
-    if state.impacts.logged[0] + islands <= state.impacts.group.shape[0]:
+    if state.impacts.logged[0] + islands <= len(state.impacts.group):
         return True
     for i in range(count):
         if contacts.mark[i] == STRIKES and not contacts.idle[i]:

@@ -117,7 +117,7 @@ def mark_new(contacts, count, previous, previous_count, distance, rigid):
     for i in range(count):
         contacts.is_new[i] = True
         for k in range(previous_count):
-            j = begin + k if begin + k < previous_count else begin + k - previous_count
+            j = wrapped(begin + k, previous_count)
             acted = previous.gap[j] < -TOUCHING or rigid and previous.normal_force[j] > 0.0
             if acted and (
                 same_name(contacts, i, previous, j)
@@ -130,8 +130,14 @@ def mark_new(contacts, count, previous, previous_count, distance, rigid):
                 )
             ):
                 contacts.is_new[i] = False
-                begin = j + 1 if j + 1 < previous_count else 0
+                begin = wrapped(j + 1, previous_count)
                 break
+
+
+@kernel
+def wrapped(k, count):
+    """Return k, less one round of `count` if it is no smaller."""
+    return k if k < count else k - count
 
 
 @kernel
@@ -150,7 +156,7 @@ def contact_before(state, i, begin):
     begins at `begin`."""
     total = state.contact_count[1]
     for k in range(total):
-        j = begin + k if begin + k < total else begin + k - total
+        j = wrapped(begin + k, total)
         if same_name(state.contacts, i, state.previous, j):
             return j
     return -1
@@ -200,7 +206,7 @@ def classify(world, state, count):
     groups = state.group_of_tree
     states = state.state_of_tree
     spreading = state.spreading
-    trees = groups.shape[0]
+    trees = len(groups)
     approaching = False
     for t in range(trees):
         if state.moving[t]:
@@ -250,7 +256,7 @@ def find_islands(world, state):
     one factor.
     """
     any_collides = False
-    for t in range(world.tree_start.shape[0]):
+    for t in range(world.trees):
         any_collides = any_collides or state.state_of_tree[t] == COLLIDING
         state.island_of_tree[t] = state.group_of_tree[t] if world.switches.impulse_limit else t
         state.collides_of_tree[t] = False
@@ -261,7 +267,7 @@ def find_islands(world, state):
     for i in range(state.contact_count[0]):
         if contacts.collides[i]:
             join(world, contacts, i, islands)
-    for t in range(islands.shape[0]):
+    for t in range(len(islands)):
         islands[t] = islands[islands[t]]  # smaller trees are settled already
     for i in range(state.contact_count[0]):
         if contacts.collides[i] and (

@@ -22,6 +22,7 @@ from iapb.contact.kernels.shape_frames import (
     copy_past,
 )
 from iapb.numerics.compiled import kernel
+from iapb.numerics.linalg import equal
 
 # share of what a contact bent off its support in a step by which the next step may differ
 BENDS = 0.5
@@ -39,7 +40,9 @@ def find_contacts(world, state):
     for i in range(state.contact_count[0]):
         copy_past(before, i, now, i)
     state.contact_count[1] = state.contact_count[0]
-    if world.switches.touch and known_at_end(state):
+    end = state.cut.end
+    found = state.cut.arriving[0] >= 0 and equal(state.q, end.q) and equal(state.v, end.v)
+    if world.switches.touch and found:
         count = state.cut.arriving[0]
         for i in range(count):
             copy_found(now, i, state.arriving, i)
@@ -51,17 +54,6 @@ def find_contacts(world, state):
     state.contact_impulse[:count] = 0.0
     classify(world, state, count)
     return count
-
-
-@kernel
-def known_at_end(state):
-    """Return whether `arriving` holds the contacts of the present q and v."""
-    known = state.cut.arriving[0] >= 0
-    for i in range(state.q.shape[0]):
-        known = known and state.q[i] == state.cut.end.q[i]
-    for k in range(state.v.shape[0]):
-        known = known and state.v[k] == state.cut.end.v[k]
-    return known
 
 
 @kernel

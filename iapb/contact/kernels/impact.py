@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-import math
+from math import sqrt
 from typing import Annotated, NamedTuple
 
 from iapb.contact.kernels.passive import UNIT, passive_step, write_step
@@ -18,8 +18,9 @@ from iapb.numerics.linalg import (
     to_momentum,
     to_whitened,
     whiten_columns,
+    write_difference,
 )
-from iapb.numerics.schema import Booleans, Floats
+from iapb.numerics.schema import Booleans, FloatPerRow, FloatPerVelocity, Floats, VelocityMatrix
 
 # Two rows that differ by less than this (rows of unit length in the kinetic metric) count as one.
 # The error of restitution is then at most (1 + e) · tolerance · |u|. A larger tolerance would
@@ -36,36 +37,36 @@ class ImpactWork(NamedTuple):
     An impact of fewer coordinates than there is room for uses the first d.
     """
 
-    mass: Annotated[Floats, "velocity velocity"]  # M, symmetric to rounding
-    lower: Annotated[Floats, "velocity velocity"]  # the Cholesky factor of its symmetric part
-    correction: Annotated[Floats, "velocity velocity"]  # C with M = L C Cᵀ Lᵀ, where `corrected`
+    mass: VelocityMatrix  # M, symmetric to rounding
+    lower: VelocityMatrix  # the Cholesky factor of its symmetric part
+    correction: VelocityMatrix  # C with M = L C Cᵀ Lᵀ, where `corrected`
     corrected: Annotated[Booleans, "1"]
-    v: Annotated[Floats, "velocity"]  # v⁻
-    v_plus: Annotated[Floats, "velocity"]
-    momentum: Annotated[Floats, "velocity"]  # generalized impulse M(v⁺ − v⁻)
+    v: FloatPerVelocity  # v⁻
+    v_plus: FloatPerVelocity
+    momentum: FloatPerVelocity  # generalized impulse M(v⁺ − v⁻)
     # rows of J as columns, then of A, then their residuals
     columns: Annotated[Floats, "velocity row"]
     rows: Annotated[Floats, "velocity row"]  # unit rows of A as columns, kept for impulses
-    length: Annotated[Floats, "row"]  # lengths of the rows of A
-    basis: Annotated[Floats, "velocity velocity"]  # rows are the orthonormal basis Q
-    triangle: Annotated[Floats, "velocity velocity"]  # T of the impulses of least norm
-    closing: Annotated[Floats, "row"]
-    size: Annotated[Floats, "row"]
-    overlap: Annotated[Floats, "row"]
-    u: Annotated[Floats, "velocity"]  # whitened velocity
-    change: Annotated[Floats, "velocity"]  # Δu; after an impact L⁻¹ of the generalized impulse
-    v_change: Annotated[Floats, "velocity"]  # Δv
-    target: Annotated[Floats, "velocity"]
-    deviation: Annotated[Floats, "velocity"]
-    along: Annotated[Floats, "velocity"]
-    shifted: Annotated[Floats, "velocity"]
+    length: FloatPerRow  # lengths of the rows of A
+    basis: VelocityMatrix  # rows are the orthonormal basis Q
+    triangle: VelocityMatrix  # T of the impulses of least norm
+    closing: FloatPerRow
+    size: FloatPerRow
+    overlap: FloatPerRow
+    u: FloatPerVelocity  # whitened velocity
+    change: FloatPerVelocity  # Δu; after an impact L⁻¹ of the generalized impulse
+    v_change: FloatPerVelocity  # Δv
+    target: FloatPerVelocity
+    deviation: FloatPerVelocity
+    along: FloatPerVelocity
+    shifted: FloatPerVelocity
 
 
 @kernel
 def rank_tolerance(lower):
     """Return the rank tolerance for rows whitened by L: RANK_TOLERANCE, or the rounding of the rows
     if it is larger."""
-    d = lower.shape[0]
+    d = len(lower)
     largest = smallest = lower[0, 0]
     for k in range(1, d):
         largest = max(largest, lower[k, k])
@@ -96,7 +97,7 @@ def whiten_impact(d, count, exact, work):
         for i in range(count):
             length[i] += columns[k, i] * columns[k, i]
     for i in range(count):
-        length[i] = math.sqrt(length[i])
+        length[i] = sqrt(length[i])
     for k in range(d):
         for i in range(count):
             if length[i] > 0.0:  # rows of zeros stay
@@ -250,7 +251,7 @@ def refine_change(d, rank, work):
             for j in range(i):
                 total -= lower[i, j] * (deviation[j] + shifted[j])
             deviation[i] = total / lower[i, i] - shifted[i]
-        felt = math.sqrt(dot_of(deviation, deviation) / size) if size > 0.0 else 0.0
+        felt = sqrt(dot_of(deviation, deviation) / size) if size > 0.0 else 0.0
         if not _FELT < felt < _CONTRACTS:
             break
         inside[:] = 0.0
@@ -258,7 +259,6 @@ def refine_change(d, rank, work):
             overlap = dot_of(work.basis[j], deviation)
             add_multiple(inside, overlap, work.basis[j])
             add_multiple(deviation, -overlap, work.basis[j])
-        for k in range(d):
-            shifted[k] = change[k] - deviation[k]
+        write_difference(shifted, change, deviation)
         from_whitened(lower, shifted, work.v_change)
     add_multiple(change, 1.0, inside)

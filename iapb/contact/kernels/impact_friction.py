@@ -18,16 +18,16 @@ friction. If ΔKE(1) ≤ 0, then α = 1 and the impact obeys Coulomb's law.
 
 from __future__ import annotations
 
-import math
+from math import inf, sqrt
 from typing import Annotated, NamedTuple
 
 from iapb.contact.kernels.impact import apply_change, write_change
-from iapb.contact.kernels.row_basis import add_minimum_norm, minimum_norm_factors
+from iapb.contact.kernels.row_basis import add_minimum_norm, along_given_row, minimum_norm_factors
 from iapb.contact.kernels.unilateral import push_only
 from iapb.numerics.compiled import copy_into, kernel
 from iapb.numerics.elementary import hypotenuse
-from iapb.numerics.linalg import add_multiple, dot_of, norm_of, orthogonalize
-from iapb.numerics.schema import Floats
+from iapb.numerics.linalg import add_multiple, dot_of, multiply_by, norm_of, orthogonalize
+from iapb.numerics.schema import FloatPerRow, FloatPerVelocity, Floats
 
 # share of a tangent's row: a smaller part outside the span of the normal rows is rounding
 GONE = 1e-13
@@ -42,20 +42,20 @@ class FrictionWork(NamedTuple):
     speed: Annotated[Floats, "tangent"]  # tangential velocity after the normal impact [m/s]
     p: Annotated[Floats, "tangent"]  # tangential impulses [N s]
     block: Annotated[Floats, "row 3"]  # the entries xx, xy, yy of B_i B_iᵀ [1/kg]
-    inertia: Annotated[Floats, "row"]  # its largest eigenvalue
+    inertia: FloatPerRow  # its largest eigenvalue
     # ∂p_n,i / ∂p_t,i by least norm: effect on its contact's p_n
     response: Annotated[Floats, "tangent"]
-    coefficient: Annotated[Floats, "row"]  # μ
-    limit: Annotated[Floats, "row"]  # Coulomb's limit μ p_n [N s]
-    change: Annotated[Floats, "row"]  # change of each limit required by a round
-    sliding: Annotated[Floats, "row"]  # μ; 0 where the frictionless normal impulse pulls
-    without: Annotated[Floats, "row"]  # normal impulses without friction [N s]
-    wanted: Annotated[Floats, "row"]  # normal impulses with friction
+    coefficient: FloatPerRow  # μ
+    limit: FloatPerRow  # Coulomb's limit μ p_n [N s]
+    change: FloatPerRow  # change of each limit required by a round
+    sliding: FloatPerRow  # μ; 0 where the frictionless normal impulse pulls
+    without: FloatPerRow  # normal impulses without friction [N s]
+    wanted: FloatPerRow  # normal impulses with friction
     # of contacts that only push: smallest velocity after, along unit rows of A
-    least: Annotated[Floats, "row"]
-    target: Annotated[Floats, "velocity"]  # Q Δ_n
-    left: Annotated[Floats, "velocity"]
-    moved: Annotated[Floats, "velocity"]  # Bᵀ p_t
+    least: FloatPerRow
+    target: FloatPerVelocity  # Q Δ_n
+    left: FloatPerVelocity
+    moved: FloatPerVelocity  # Bᵀ p_t
     velocity: Annotated[Floats, "direction"]
 
 
@@ -71,13 +71,13 @@ def add_impact_friction(d, count, rank, work, push, f, only_push, impulses):
     only_push : whether contacts only push; `impulses` then holds the normal impulses of Poisson's
         law.
     """
-    p = f.p[: count * f.velocity.shape[0]]
+    p = f.p[: count * len(f.velocity)]
     u = work.u[:d]
     change = work.change[:d]
     moved = f.moved[:d]
     largest = 0.0
     # whiten the tangents' rows, and remove the span of the normal rows: B and A_t Qᵀ
-    for j in range(p.shape[0]):
+    for j in range(len(p)):
         row = f.rows[j, :d]
         slip = 0.0
         whiten_row(row, work)
@@ -89,12 +89,11 @@ def add_impact_friction(d, count, rank, work, push, f, only_push, impulses):
         if orthogonalize(row, work.basis, rank, f.normal_part[j]) <= GONE * GONE * before:
             row[:] = 0.0
     # of the rounding of a tangential velocity [m/s]
-    scale = math.sqrt(largest) * norm_of(u)
+    scale = sqrt(largest) * norm_of(u)
     met = settle_friction(count, rank, work, push, f, d, scale, only_push, impulses)
     share = share_within_cone(count, f)
     combine(count, f, d)
-    for k in range(d):
-        moved[k] *= share
+    multiply_by(moved, share)
     alpha = passive_share(u, change, moved)
     share *= alpha
     add_multiple(change, alpha, moved)
@@ -102,7 +101,7 @@ def add_impact_friction(d, count, rank, work, push, f, only_push, impulses):
     clamp = apply_change(d, True, work)
     for i in range(count):
         impulses[i] = clamp * (f.without[i] + share * (f.wanted[i] - f.without[i]))
-    for j in range(p.shape[0]):
+    for j in range(len(p)):
         p[j] *= clamp * share
     return share, clamp, met
 
@@ -112,23 +111,34 @@ def whiten_row(row, work):
     """Solve L x = row in place, or L C x = row (`correct_factor`)."""
     for turn in range(2 if work.corrected[0] else 1):
         factor = work.correction if turn else work.lower
-        for k in range(row.shape[0]):
+        for k in range(len(row)):
             row[k] = (row[k] - dot_of(factor[k], row[:k])) / factor[k, k]
+
+
+@kernel
+def length_of_friction(f, i):
+    """Return |p_t| of contact i [N s]."""
+    size = len(f.velocity)
+    return norm_of(f.p[i * size : (i + 1) * size])
+
+
+@kernel
+def cone(f, i):
+    """Return Coulomb's limit of contact i at its present normal impulse [N s]."""
+    return f.sliding[i] * max(f.wanted[i], 0.0)
 
 
 @kernel
 def share_within_cone(count, f):
     """Return the largest β with β |p_t| ≤ μ p(β) at every contact; p(β) is linear between `without`
     and `wanted`."""
-    size = f.velocity.shape[0]
     share = 1.0
     largest = 0.0
     for i in range(count):
         largest = max(largest, abs(f.wanted[i]))
     for i in range(count):
-        own = f.p[i * size : (i + 1) * size]
         mu = f.coefficient[i]
-        length = norm_of(own)
+        length = length_of_friction(f, i)
         excess = length - mu * max(f.wanted[i], 0.0)
         room = mu * max(f.without[i], 0.0)
         if excess > mu * CONE_ROUNDING * largest and length > 0.0:
@@ -145,7 +155,7 @@ def passive_share(u, change, moved):
     lost = max(0.0, -dot_of(u, change) - 0.5 * dot_of(change, change))
     if square == 0.0 or 0.5 * square + slope <= lost:
         return 1.0
-    root = math.sqrt(slope * slope + 2.0 * square * lost)
+    root = sqrt(slope * slope + 2.0 * square * lost)
     return min(1.0, (root - slope) / square if slope <= 0.0 else 2.0 * lost / (root + slope))
 
 
@@ -204,7 +214,7 @@ def settle_friction(count, rank, work, push, f, d, scale, only_push, impulses):
     another, and friction would stop anything.
     scale : speed [m/s] to which STILL and MET are relative.
     """
-    size = f.velocity.shape[0]
+    size = len(f.velocity)
     for i in range(count):
         set_inertia(f, i, d)
     f.p[: count * size] = 0.0
@@ -238,7 +248,7 @@ def sweep_impact(d, count, work, f, impulses):
     scratch stays as it is.
     impulses : (≥count,) of the result so far, from which the sweeps start, as they do from `f.p`.
     """
-    size = f.velocity.shape[0]
+    size = len(f.velocity)
     u = work.u[:d]
     moved = f.moved[:d]
     p_n = f.wanted
@@ -249,7 +259,7 @@ def sweep_impact(d, count, work, f, impulses):
         set_inertia(f, i, d)
         p_n[i] = impulses[i] * work.length[i]
     speed = norm_of(u)
-    fastest = math.inf
+    fastest = inf
     for _ in range(IMPACT_SWEEPS):
         combine(count, f, d)
         for k in range(d):
@@ -264,10 +274,10 @@ def sweep_impact(d, count, work, f, impulses):
             p_n[i] += change
             for k in range(d):
                 moved[k] += work.rows[k, i] * change
-            f.limit[i] = f.coefficient[i] * p_n[i] / work.length[i] if work.length[i] > 0.0 else 0.0
+            f.limit[i] = along_given_row(work, i, f.coefficient[i] * p_n[i])
             fastest = max(fastest, abs(change))
             if f.inertia[i] > 0.0:
-                fastest = max(fastest, _slide(f, i, d) / math.sqrt(f.inertia[i]))
+                fastest = max(fastest, _slide(f, i, d) / sqrt(f.inertia[i]))
         if fastest <= MET * speed:
             break
     if fastest > SWEPT * speed or dot_of(u, moved) + 0.5 * dot_of(moved, moved) > 0.0:
@@ -276,7 +286,7 @@ def sweep_impact(d, count, work, f, impulses):
     write_change(d, work)
     clamp = apply_change(d, True, work)
     for i in range(count):
-        impulses[i] = clamp * p_n[i] / work.length[i] if work.length[i] > 0.0 else 0.0
+        impulses[i] = along_given_row(work, i, clamp * p_n[i])
     return clamp, True
 
 
@@ -286,7 +296,7 @@ def _start(count, rank, work, push, f, d):
     ones exist."""
     change = work.change[:d]
     left = f.left[:d]
-    size = f.velocity.shape[0]
+    size = len(f.velocity)
     length = norm_of(change)
     for k in range(d):
         f.moved[k] = -change[k] / length if length > 0.0 else 0.0
@@ -305,7 +315,7 @@ def _start(count, rank, work, push, f, d):
     if not pushes:
         return False
     for i in range(count):
-        f.without[i] = length * f.without[i] / work.length[i] if work.length[i] > 0.0 else 0.0
+        f.without[i] = along_given_row(work, i, length * f.without[i])
         f.sliding[i] = f.coefficient[i]
         f.limit[i] = 0.0
     # an active set loads only a few of redundant contacts
@@ -320,7 +330,7 @@ def _move_normals(count, rank, work, f, near):
     left = f.left[:rank]
     defect = 0.0
     copy_into(left, f.target)
-    for j in range(count * f.velocity.shape[0]):
+    for j in range(count * len(f.velocity)):
         if f.p[j] != 0.0:
             add_multiple(left, -f.p[j], f.normal_part[j])
     if near:
@@ -339,32 +349,31 @@ def _move_normals(count, rank, work, f, near):
 def _settle(count, rank, work, f, d, scale, pushes):
     """Iterate normal impulses, limits and p_t; return whether the last round changed less than MET
     times the scale."""
-    size = f.velocity.shape[0]
+    size = len(f.velocity)
     speed = norm_of(work.u[:d])
     still = STILL * scale
-    moved = math.inf
+    moved = inf
     for done in range(ROUNDS):
         defect = _move_normals(count, rank, work, f, pushes)
         step = 1.0 if done < UNDAMPED else (HALF if done < HALVED else FIFTH)
         for i in range(count):
             if pushes:
                 f.wanted[i] = max(f.wanted[i], 0.0)
-            own = f.p[i * size : (i + 1) * size]
             stride = 1.0
-            length = norm_of(own)
+            length = length_of_friction(f, i)
             # Newton's step for a single sliding contact
             if length > 0.0 and length >= AT_LIMIT * f.limit[i]:
+                own = f.p[i * size : (i + 1) * size]
                 gain = f.sliding[i] * dot_of(f.response[i * size : (i + 1) * size], own) / length
                 stride = 1.0 / max(1.0 - gain, 1.0 / STRIDE)
-            f.change[i] = f.sliding[i] * max(f.wanted[i], 0.0) - f.limit[i]
+            f.change[i] = cone(f, i) - f.limit[i]
             f.limit[i] = max(0.0, f.limit[i] + step * stride * f.change[i])
         moved = friction_sweeps(count, f, d, 1, 0.0)
         if moved > still:
             friction_sweeps(count, f, d, SWEEPS - 1, SETTLED * moved)
         for i in range(count):  # an undamped limit that holds p_t would move it on
-            own = f.p[i * size : (i + 1) * size]
             change = abs(f.change[i])
-            length = norm_of(own)
+            length = length_of_friction(f, i)
             if length >= f.limit[i] - STRIDE * change:
                 moved = max(moved, f.inertia[i] * min(change, length))
         if speed > 0.0:
@@ -378,19 +387,17 @@ def _settle(count, rank, work, f, d, scale, pushes):
 def _trim(count, rank, work, f, near):
     """Shorten each contact's p_t that the last round left outside its cone, and update the normal
     impulses."""
-    size = f.velocity.shape[0]
     largest = 0.0
     for turn in range(TRIMS + 1):
         _move_normals(count, rank, work, f, near)
         within = True
         for i in range(count if turn < TRIMS else 0):
-            own = f.p[i * size : (i + 1) * size]
-            limit = f.sliding[i] * max(f.wanted[i], 0.0)
-            length = norm_of(own)
+            limit = cone(f, i)
+            length = length_of_friction(f, i)
             if length > limit:
                 within = False
-                for a in range(size):
-                    own[a] *= limit / length
+                size = len(f.velocity)
+                multiply_by(f.p[i * size : (i + 1) * size], limit / length)
         if within:
             break
     for i in range(count):
@@ -411,7 +418,7 @@ SINGULAR = 1e-12
 @kernel
 def set_inertia(f, i, d):
     """Write the entries of B_i B_iᵀ, which has one or two rows, and its largest eigenvalue."""
-    size = f.velocity.shape[0]
+    size = len(f.velocity)
     x = f.rows[i * size, :d]
     y = f.rows[i * size + size - 1, :d]
     xx = dot_of(x, x)
@@ -428,7 +435,7 @@ def combine(count, f, d):
     """Write moved = Bᵀ p."""
     moved = f.moved[:d]
     moved[:] = 0.0
-    for j in range(count * f.velocity.shape[0]):
+    for j in range(count * len(f.velocity)):
         add_multiple(moved, f.p[j], f.rows[j])
 
 
@@ -459,7 +466,7 @@ def _slide(f, i, d):
     """Move one contact's impulse to stop its slip, or towards its limit; return the change of
     velocity [m/s]."""
     velocity = f.velocity
-    size = f.velocity.shape[0]
+    size = len(f.velocity)
     moved = f.moved[:d]
     first = i * size
     limit = f.limit[i]
@@ -472,8 +479,7 @@ def _slide(f, i, d):
             velocity[a] = f.p[first + a] - velocity[a] / inertia
         length = norm_of(velocity)
         share = limit / length if length > limit else 1.0
-        for a in range(size):
-            velocity[a] *= share
+        multiply_by(velocity, share)
         fastest = 0.0
         for a in range(size):
             fastest = max(fastest, inertia * abs(velocity[a] - f.p[first + a]))
@@ -489,7 +495,7 @@ def _stops(f, i, first):
     """Write into `velocity` the impulse that stops a contact with two tangents; False if it exceeds
     the limit."""
     # of two, steps of length 1/ρ would need κ(B_i B_iᵀ) sweeps; with a lever, hundreds
-    if f.velocity.shape[0] != 2:
+    if len(f.velocity) != 2:
         return False
     xx = f.block[i, 0]
     xy = f.block[i, 1]

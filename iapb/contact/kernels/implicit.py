@@ -27,7 +27,7 @@ numbers is shortened until it does.
 
 from __future__ import annotations
 
-import math
+from math import inf, sqrt
 from typing import Annotated, NamedTuple
 
 from iapb.contact.kernels.contact_set import (
@@ -40,19 +40,31 @@ from iapb.contact.kernels.contact_set import (
 from iapb.contact.kernels.rows import friction_of, tangent_of, twist, write_pair_rows
 from iapb.numerics.compiled import kernel
 from iapb.numerics.linalg import (
+    ZERO,
     add,
     add_multiple,
     cross,
     dot,
     dot_of,
     load,
+    multiply_by,
     placed,
     scale,
     store,
     subtract,
     transform_back,
+    write_difference,
 )
-from iapb.numerics.schema import Floats, Integers
+from iapb.numerics.schema import (
+    FloatPerContact,
+    FloatPerVelocity,
+    Floats,
+    Integers,
+    NumberPerTree,
+    NumberPerVelocity,
+    SingleFloat,
+    SingleInteger,
+)
 
 # m/s: a contact that slips more slowly sticks, with a friction in proportion to its slip
 STICKING = 1e-10
@@ -91,29 +103,29 @@ class RestWork(NamedTuple):
     rows: Annotated[Floats, "rest_row width"]  # rows of J: one half for each of the two trees
     speed: Annotated[Floats, "rest_row"]  # J v [m/s]
     p: Annotated[Floats, "rest_row"]  # impulses of the step [N s]
-    limit: Annotated[Floats, "contact"]  # limits c = μ F_n Δt of friction [N s]
+    limit: FloatPerContact  # limits c = μ F_n Δt of friction [N s]
     # what a contact moved more than Δt J v in the step before, by Δt [m/s]
     bend: Annotated[Floats, "rest_row"]
-    stiffness: Annotated[Floats, "1"]  # K of the group's contacts [N/m]
-    first: Annotated[Integers, "tree"]  # first contact of each group, by its first tree, −1 = none
+    stiffness: SingleFloat  # K of the group's contacts [N/m]
+    first: NumberPerTree  # first contact of each group, by its first tree, −1 = none
     next: Annotated[Integers, "contact"]  # contact of the same group that follows, −1 = none
-    next_tree: Annotated[Integers, "tree"]  # tree of the same group that follows, −1 = none
-    offset: Annotated[Integers, "tree"]  # first local coordinate of each tree
-    dof: Annotated[Integers, "velocity"]  # the coordinate v[dof] of each local one
-    begin: Annotated[Integers, "velocity"]  # first local coordinate of its tree
-    end: Annotated[Integers, "velocity"]  # and the one after the last
+    next_tree: NumberPerTree  # tree of the same group that follows, −1 = none
+    offset: NumberPerTree  # first local coordinate of each tree
+    dof: NumberPerVelocity  # the coordinate v[dof] of each local one
+    begin: NumberPerVelocity  # first local coordinate of its tree
+    end: NumberPerVelocity  # and the one after the last
     # first nonzero column of each row of the Newton matrix
-    envelope: Annotated[Integers, "velocity"]
+    envelope: NumberPerVelocity
     change: Annotated[Floats, "rest_row"]  # J Δv of a Newton step
-    v: Annotated[Floats, "velocity"]  # local velocities
-    free: Annotated[Floats, "velocity"]  # v*
-    dry: Annotated[Floats, "velocity"]  # limits Δt F of joint friction [N s, N m s]
-    balance: Annotated[Floats, "velocity"]  # M (v − v*) − Jᵀ p
-    change_of_v: Annotated[Floats, "velocity"]  # v − v*
-    step: Annotated[Floats, "velocity"]  # Newton step
-    given: Annotated[Floats, "velocity"]  # M times a vector, or L⁻¹ of one
-    energy: Annotated[Floats, "1"]  # ½ v*ᵀ M v* [J]
-    shortened: Annotated[Integers, "1"]  # solutions that were shortened, since the start
+    v: FloatPerVelocity  # local velocities
+    free: FloatPerVelocity  # v*
+    dry: FloatPerVelocity  # limits Δt F of joint friction [N s, N m s]
+    balance: FloatPerVelocity  # M (v − v*) − Jᵀ p
+    change_of_v: FloatPerVelocity  # v − v*
+    step: FloatPerVelocity  # Newton step
+    given: FloatPerVelocity  # M times a vector, or L⁻¹ of one
+    energy: SingleFloat  # ½ v*ᵀ M v* [J]
+    shortened: SingleInteger  # solutions that were shortened, since the start
 
 
 @kernel
@@ -129,13 +141,13 @@ def rest_implicitly(world, state, touches, rubs):
             continue
         contacts.normal_force[i] = 0.0
         if rubs:
-            store(contacts.friction_force, i, (0.0, 0.0, 0.0))
+            store(contacts.friction_force, i, ZERO)
         group = group_of_contact(world, contacts, i, state.group_of_tree)
         if contacts.mark[i] != LEFT:
             work.next[i] = work.first[group]
             work.first[group] = i
             some = True
-    for t in range(world.tree_start.shape[0] if world.switches.joint_friction else 0):
+    for t in range(world.trees if world.switches.joint_friction else 0):
         if state.moving[t] and is_dry(world, t):
             group = state.group_of_tree[t]
             some = True
@@ -143,12 +155,12 @@ def rest_implicitly(world, state, touches, rubs):
     if not some:
         return
     work.next_tree[:] = -1
-    for t in range(world.tree_start.shape[0] - 1, -1, -1):
+    for t in range(world.trees - 1, -1, -1):
         group = state.group_of_tree[t]
         if group != t:  # its first tree is the group's number
             work.next_tree[t] = work.next_tree[group]
             work.next_tree[group] = t
-    for group in range(world.tree_start.shape[0]):
+    for group in range(world.trees):
         if work.first[group] >= 0 or work.first[group] == DRY:
             rest_group(world, state, group, 1 + world.tangents if rubs else 1)
 
@@ -237,7 +249,7 @@ def stiffness_of_group(world, work, group, h):
     if not world.rigid:
         return world.stiffness, world.stiffness * h + world.damping
     heaviest = 0.0
-    lightest = math.inf
+    lightest = inf
     t = group
     while t >= 0:
         heaviest = max(heaviest, world.tree_mass[t])
@@ -252,8 +264,7 @@ def gather_contacts(world, state, group, s):
     """Write rows, limits and softness of the group's contacts; return their number."""
     work = state.rest_work
     contacts = state.contacts
-    count = 0
-    begin = 0
+    count = begin = 0
     i = state.rest_work.first[group]
     while i >= 0:
         work.contact[count] = i
@@ -271,7 +282,7 @@ def gather_contacts(world, state, group, s):
         directions = work.direction[own : own + s]
         write_pair_rows(world, state, trees, i, directions, work.rows[own : own + s])
         before = contact_before(state, i, begin)
-        store(contacts.drift, i, (0.0, 0.0, 0.0))
+        store(contacts.drift, i, ZERO)
         if before >= 0:
             begin = before + 1
             force = state.previous.normal_force[before]
@@ -427,7 +438,7 @@ def slide_speed(work, r, s, share):
     for j in range(r * s + 1, (r + 1) * s):
         w = speed_at(work, j, share)
         square += w * w
-    return math.sqrt(square) if square > STICKING * STICKING else STICKING
+    return sqrt(square) if square > STICKING * STICKING else STICKING
 
 
 @kernel
@@ -467,8 +478,7 @@ def open_balance(world, state, size, count, s, k):
     work = state.rest_work
     squares = 0.0
     along_rows(work, count, s, work.v, work.speed)
-    for i in range(size):
-        work.change_of_v[i] = work.v[i] - work.free[i]
+    write_difference(work.change_of_v[:size], work.v, work.free)
     times_mass(world, state, size, work.change_of_v, work.balance)
     set_impulses(world, state, count, s, k, 0.0)
     for r in range(count):
@@ -583,7 +593,7 @@ def factor_envelope(matrix, envelope, size):
             pivot -= row[k] * row[k]
         if not pivot > 0.0:
             return False
-        row[i] = 1.0 / math.sqrt(pivot)
+        row[i] = 1.0 / sqrt(pivot)
     return True
 
 
@@ -739,8 +749,7 @@ def guard(world, state, size, count, s):
         share = 0.5 * share if share > 1e-3 else 0.0
     if share < 1.0:
         work.shortened[0] += 1
-        for i in range(size):
-            work.v[i] *= share
+        multiply_by(work.v[:size], share)
 
 
 @kernel
@@ -756,7 +765,7 @@ def remember_points(world, state, r, s):
     _, _, omega_a = twist(world, state, contacts.body_a[i])
     _, _, omega_b = twist(world, state, contacts.body_b[i])
     store(contacts.rolled, i, scale(state.h[0], cross(subtract(omega_a, omega_b), n)))
-    slid = (0.0, 0.0, 0.0)
+    slid = ZERO
     for j in range(r * s, (r + 1) * s):
         slid = add(slid, scale(state.h[0] * work.speed[j], load(work.direction, j)))
     store(contacts.slid, i, slid)
@@ -777,7 +786,7 @@ def give_back(world, state, size, count, s):
         state.v[work.dof[i]] = work.v[i]
     for r in range(count):
         i = work.contact[r]
-        force = (0.0, 0.0, 0.0)
+        force = ZERO
         contacts.normal_force[i] = work.p[r * s] / state.h[0]
         contacts.span[i] = state.h[0]
         contacts.expected[i] = contacts.gap[i] + state.h[0] * work.speed[r * s]

@@ -27,11 +27,11 @@ def add_stops(world, state, contacts, count, margin):
     is no room."""
     stops = world.stops
     w = state.body
-    for i in range(stops.bound.shape[0]):
+    for i in range(len(stops.bound)):
         gap = stops.arm[i] * stops.sign[i] * (state.q[stops.coordinate[i]] - stops.bound[i])
         if gap > margin:
             continue
-        if count >= contacts.gap.shape[0]:
+        if count >= len(contacts.gap):
             return -1
         k = stops.dof[i]
         body = stops.body[i]

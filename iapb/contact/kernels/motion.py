@@ -35,10 +35,12 @@ from iapb.mechanics.kernels.free_motion import (
 from iapb.mechanics.kernels.kinematics import forward_kinematics
 from iapb.numerics.compiled import copy_into, kernel
 from iapb.numerics.linalg import (
+    ZERO,
     add,
     add_multiple,
     cholesky,
     cholesky_tree_blocks,
+    equal,
     scale,
     solve_mass,
     solve_tree_blocks,
@@ -68,9 +70,7 @@ def locate(world, state):
     forward_kinematics(world.mechanism, state.q, state.body)
     stale = world.switches.varying_inertia
     if world.conserving and stale:
-        stale = False
-        for i in range(state.q.shape[0]):
-            stale = stale or state.q[i] != state.located_q[i]
+        stale = not equal(state.q, state.located_q)
         copy_into(state.located_q, state.q)
     if not stale:
         return True
@@ -91,7 +91,7 @@ def move(world, state, applied):
     if implicit and not implicit_forces(world, state, touches):
         return NOT_POSITIVE_DEFINITE
     finite = True
-    for k in range(state.v.shape[0]):
+    for k in range(len(state.v)):
         finite = finite and abs(state.v[k]) < LARGEST_SPEED  # False for NaN too
     if not finite:
         return NOT_FINITE
@@ -110,7 +110,7 @@ def implicit_forces(world, state, touches):
         return False
     if touches or world.switches.joint_friction:
         rest_implicitly(world, state, touches, touches and world.switches.friction)
-        for k in range(state.v.shape[0] if damped else 0):
+        for k in range(len(state.v) if damped else 0):
             state.acceleration[k] = -world.joint_damping[k] * state.v[k]
     if damped:
         add_multiple(state.friction_force, 1.0, state.acceleration)
@@ -146,7 +146,7 @@ def drift(world, state, applied):
 def coriolis(world, state):
     """acceleration <- −M⁻¹ B at the present state."""
     bias(world.mechanism, state.body, state.v, state.bias)
-    for k in range(state.v.shape[0]):
+    for k in range(len(state.v)):
         state.acceleration[k] = -state.bias[k]
     solve_tree_blocks(
         state.lower, world.tree_start, world.tree_stop, state.acceleration, state.acceleration
@@ -160,10 +160,10 @@ def swing(world, state, h):
     m = world.mechanism
     free = world.free
     a = state.acceleration
-    for t in range(free.kind.shape[0]):
+    for t in range(len(free.kind)):
         if free.kind[t] == LINKAGE:
             note_momentum(world, state, t, h)
-    for b in range(m.kind.shape[0]):
+    for b in range(len(m.kind)):
         if free.kind[world.tree_of_body[b]] == LINKAGE:
             start = m.v_start[b]
             stop = start + m.v_count[b]
@@ -172,17 +172,17 @@ def swing(world, state, h):
             add_multiple(state.v[start:stop], 0.5 * h, a[start:stop])
     if not locate(world, state):
         return False
-    for t in range(free.kind.shape[0]):
+    for t in range(len(free.kind)):
         if moves_freely(world, t):
             p = state.root_momentum[t]
             center, _ = center_of(m, state.body, world.tree_of_body, t)
             missed = subtract((p[6], p[7], p[8]), center)
             shift_root(m, free, state.body, world.tree_of_body, state.q, t, missed)
     copy_into(state.located_q, state.q)
-    copy_into(state.body.placed_q[: state.q.shape[0]], state.q)
+    copy_into(state.body.placed_q[: len(state.q)], state.q)
     copy_into(state.acceleration_before, a)
     coriolis(world, state)
-    for t in range(free.kind.shape[0]):
+    for t in range(len(free.kind)):
         if free.kind[t] == LINKAGE:
             end_swing(world, state, t, h)
     return True
@@ -259,7 +259,7 @@ def pull_falling_trees(world, state, applied):
     """Add half a step of gravity to the velocity of falling trees; the other half acted before they
     moved."""
     some = False
-    for t in range(world.tree_start.shape[0]):
+    for t in range(world.trees):
         some = some or falls(world, state, applied, t)
     if not some:
         return
@@ -272,7 +272,7 @@ def pull_falling_trees(world, state, applied):
 @kernel
 def add_to_falling_trees(world, state, applied, vector, factor):
     """Do vector += factor · `bias` for the falling trees."""
-    for t in range(world.tree_start.shape[0]):
+    for t in range(world.trees):
         if falls(world, state, applied, t):
             start = world.tree_start[t]
             stop = world.tree_stop[t]
@@ -290,7 +290,7 @@ def damp_joints(world, state):
     a = state.acceleration
     mass = state.work.mass
     lower = state.work.lower
-    for t in range(world.tree_start.shape[0]):
+    for t in range(world.trees):
         start = world.tree_start[t]
         stop = world.tree_stop[t]
         damped = False
@@ -325,13 +325,13 @@ def accelerate(world, state, applied):
     if not world.switches.implicit_contact:
         for i in range(state.contact_count[0]):
             contacts.normal_force[i] = 0.0
-            store(contacts.friction_force, i, (0.0, 0.0, 0.0))
+            store(contacts.friction_force, i, ZERO)
             if (
                 state.state_of_tree[group_of_contact(world, contacts, i, state.group_of_tree)]
                 != COLLIDING
             ):
                 resting_force(world, state, contacts, i)
-    for k in range(a.shape[0]):
+    for k in range(len(a)):
         a[k] = applied[k] + state.penalty_force[k] + state.friction_force[k]
     if world.switches.gravity:
         gravity(world.mechanism, state.body, world.gravity, state.bias)

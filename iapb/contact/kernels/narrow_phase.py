@@ -8,9 +8,9 @@ nothing else. A contact is kept when gap <= margin. Nothing is allocated.
 
 from __future__ import annotations
 
-import math
+from math import inf, sqrt
 
-from iapb.contact.geometry import CIRCLE, HALF_PLANE, HALF_SPACE, SPHERE
+from iapb.contact.geometry import BOX, CIRCLE, HALF_PLANE, HALF_SPACE, SPHERE
 from iapb.contact.kernels.shape_frames import (
     ball_on_surface,
     balls,
@@ -22,7 +22,7 @@ from iapb.contact.kernels.shape_frames import (
     vertex_feature,
     world_center,
 )
-from iapb.contact.kernels.spatial_pairs import spatial_pair
+from iapb.contact.kernels.spatial_pairs import boxes, corners_half_space, sphere_box
 from iapb.numerics.compiled import kernel
 from iapb.numerics.elementary import hypotenuse
 
@@ -39,15 +39,21 @@ def detect(shapes, pairs, w, margin, buffer):
     buffer : ContactBuffer; only its geometric fields are written
     """
     count = 0
-    for k in range(pairs.shape[0]):
+    for k in range(len(pairs)):
         a = pairs[k, 0]
         b = pairs[k, 1]
         kind_a = shapes.kind[a]
         kind_b = shapes.kind[b]
         if kind_a == kind_b and kind_a in (CIRCLE, SPHERE):
             count = balls(shapes, a, b, w, margin, buffer, count)
-        elif kind_a >= HALF_SPACE:
-            count = spatial_pair(shapes, a, b, w, margin, buffer, count)
+        elif kind_b == HALF_SPACE:
+            count = corners_half_space(shapes, a, b, w, margin, buffer, count)
+        elif kind_a == SPHERE:
+            count = sphere_box(shapes, a, b, True, w, margin, buffer, count)
+        elif kind_b == SPHERE:
+            count = sphere_box(shapes, b, a, False, w, margin, buffer, count)
+        elif kind_a == BOX:
+            count = boxes(shapes, a, b, w, margin, buffer, count)
         elif kind_b == HALF_PLANE:
             count = vertices_half_plane(shapes, a, b, w, margin, buffer, count)
         elif kind_a == CIRCLE:
@@ -69,6 +75,14 @@ def corner(shapes, shape, i):
 def following(shapes, shape, i):
     """Return the number of the corner, or edge, after number i."""
     return i + 1 if i + 1 < shapes.count[shape] else 0
+
+
+@kernel
+def edge_from(shapes, shape, i):
+    """Return where edge i of a polygon begins, and the vector along it, in its frame."""
+    x, y = corner(shapes, shape, i)
+    end_x, end_y = corner(shapes, shape, following(shapes, shape, i))
+    return x, y, end_x - x, end_y - y
 
 
 @kernel
@@ -113,15 +127,12 @@ def circle_polygon(shapes, circle, polygon, circle_is_a, w, margin, buffer, coun
     """
     x, y = corner(shapes, circle, 0)
     x, y = place(relative_frame(shapes, polygon, circle, w), x, y)
-    best = -math.inf
+    best = -inf
     edge = 0
     nx = 0.0
     ny = 1.0
     for i in range(shapes.count[polygon]):
-        ux, uy = corner(shapes, polygon, i)
-        wx, wy = corner(shapes, polygon, following(shapes, polygon, i))
-        ex = wx - ux
-        ey = wy - uy
+        ux, uy, ex, ey = edge_from(shapes, polygon, i)
         length = hypotenuse(ex, ey)
         distance = ((x - ux) * ey - (y - uy) * ex) / length
         if distance > best:
@@ -132,10 +143,8 @@ def circle_polygon(shapes, circle, polygon, circle_is_a, w, margin, buffer, coun
             if best - shapes.radius[circle] > margin:
                 return count
     feature = vertex_feature(1, 0, edge)
-    ux, uy = corner(shapes, polygon, edge)
+    ux, uy, ex, ey = edge_from(shapes, polygon, edge)
     wx, wy = corner(shapes, polygon, following(shapes, polygon, edge))
-    ex = wx - ux
-    ey = wy - uy
     before = (x - ux) * ex + (y - uy) * ey < 0.0
     beyond = (x - wx) * ex + (y - wy) * ey > 0.0
     if best > 0.0 and (before or beyond):  # an end of the edge is nearer
@@ -203,14 +212,14 @@ def best_edge(shapes, onto, other, w, margin):
     its start
     """
     frame = relative_frame(shapes, onto, other, w)
-    best = -math.inf
+    best = -inf
     edge = 0
     for i in range(shapes.count[onto]):
         ux, uy, nx, ny, _ = edge_frame(shapes, onto, i)
         # the normal in the other's frame
         mx = frame[0] * nx + frame[2] * ny
         my = frame[1] * nx + frame[3] * ny
-        lowest = math.inf
+        lowest = inf
         for k in range(shapes.count[other]):
             x, y = corner(shapes, other, k)
             lowest = min(lowest, mx * x + my * y)
@@ -227,11 +236,8 @@ def best_edge(shapes, onto, other, w, margin):
 def edge_frame(shapes, shape, edge):
     """Return start (x, y), outward unit normal (x, y) and length of an edge, in the polygon's
     frame."""
-    ux, uy = corner(shapes, shape, edge)
-    wx, wy = corner(shapes, shape, following(shapes, shape, edge))
-    ex = wx - ux
-    ey = wy - uy
-    length = math.sqrt(ex * ex + ey * ey)
+    ux, uy, ex, ey = edge_from(shapes, shape, edge)
+    length = sqrt(ex * ex + ey * ey)
     return ux, uy, ey / length, -ex / length, length
 
 
@@ -244,7 +250,7 @@ def _against_reference(shapes, ref, other, edge, separation, ref_is_b, w, margin
     mx = xx * nx + yx * ny
     my = xy * nx + yy * ny
     incident = 0
-    opposed = math.inf
+    opposed = inf
     # the incident edge: its outward normal is most opposed to this one's
     for i in range(shapes.count[other]):
         _, _, ox, oy, _ = edge_frame(shapes, other, i)
@@ -265,7 +271,7 @@ def _against_reference(shapes, ref, other, edge, separation, ref_is_b, w, margin
             return _corners(shapes, ref, other, ref_is_b, w, margin, buffer, count)
         # Overlapping: only rounding can put the deepest vertex outside the strip. Take it as it is.
         start_s, start_h = (s0, separation) if h0 < h1 else (s1, separation)
-        end_h = math.inf
+        end_h = inf
 
     # vertex of the incident or of the reference edge
     side, opposite = (0, 1) if ref_is_b else (1, 0)
@@ -323,12 +329,9 @@ def _corners(shapes, ref, other, ref_is_b, w, margin, buffer, count):
     the normal of this edge and its separation is already the distance.
     """
     frame = relative_frame(shapes, ref, other, w)
-    best = math.inf
+    best = inf
     feature = 0
-    vx = 0.0
-    vy = 0.0
-    wx = 0.0
-    wy = 0.0
+    vx = vy = wx = wy = 0.0
     for j in range(shapes.count[other]):
         x, y = corner(shapes, other, j)
         x, y = place(frame, x, y)
@@ -342,7 +345,7 @@ def _corners(shapes, ref, other, ref_is_b, w, margin, buffer, count):
                 wx = x
                 wy = y
                 feature = vertex_feature(2, i, j) if ref < other else vertex_feature(2, j, i)
-    distance = math.sqrt(best)
+    distance = sqrt(best)
     if distance > margin:
         return count
     return _store_from(

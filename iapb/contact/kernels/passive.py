@@ -16,7 +16,7 @@ and without contraction.
 
 from __future__ import annotations
 
-import math
+from math import copysign, frexp, inf, isfinite, ldexp, sqrt
 
 import numpy as np
 
@@ -43,29 +43,32 @@ def gain(mass_matrix, v, w):
     2⁻⁹⁶⁹. Overflow, also in Dekker's splitting, makes high + (low + radius) NaN or infinite, which
     `gain_enclosure` refuses (verification/proofs/coq/Accepted.v, never_gains_in_binary64).
     """
-    d = v.shape[0]
+    d = len(v)
     high = low = size = moved = 0.0
     for i in range(d):
         h = l = row_size = 0.0
         for j in range(d):
             a_hi, a_lo = two_sum(mass_matrix[i, j], mass_matrix[j, i])
             s_hi, s_lo = two_sum(w[j], v[j])
-            p, e = two_product(a_hi, s_hi)
-            c = a_hi * s_lo + a_lo * s_hi
-            h, t = two_sum(h, p)
-            l += (t + e) + c
+            h, l, p = _add_pairs(h, l, a_hi, a_lo, s_hi, s_lo)
             row_size += abs(p)
         d_hi, d_lo = two_sum(w[i], -v[i])
-        p, e = two_product(d_hi, h)
-        c = d_hi * l + d_lo * h
-        high, t = two_sum(high, p)
-        low += (t + e) + c
+        high, low, _ = _add_pairs(high, low, d_hi, d_lo, h, l)
         size += abs(d_hi) * row_size
         moved += abs(d_hi)
     if moved == 0.0:
         return 0.0, 0.0, 0.0, 0.0
     margin = d + 6.0
     return high, low, 2.0 * margin * margin * UNIT * UNIT * size, d * _UNDERFLOW * (1.0 + moved)
+
+
+@kernel
+def _add_pairs(high, low, a_hi, a_lo, b_hi, b_lo):
+    """Return high and low with the product of two pairs added, and the product of their high parts."""
+    p, e = two_product(a_hi, b_hi)
+    c = a_hi * b_lo + a_lo * b_hi
+    high, t = two_sum(high, p)
+    return high, low + ((t + e) + c), p
 
 
 @kernel
@@ -84,7 +87,7 @@ def wide_gain(mass_matrix, v, w):
     Coq proves it, and that no number overflows, if frexp and ldexp are exact
     (verification/proofs/coq/Wide.v, wide_never_gains_in_binary64).
     """
-    d = v.shape[0]
+    d = len(v)
     top = -100_000
     count = 0
     high = low = size = 0.0
@@ -93,7 +96,7 @@ def wide_gain(mass_matrix, v, w):
             for j in range(d):
                 if mass_matrix[i, j] == 0.0:
                     continue
-                m, m_exponent = math.frexp(mass_matrix[i, j])
+                m, m_exponent = frexp(mass_matrix[i, j])
                 for choice in range(8):
                     x, x_exponent = _half(v[i], w[i], choice < 4, choice % 2 == 1)
                     y, y_exponent = _half(v[j], w[j], choice >= 4, choice % 4 >= 2)
@@ -104,7 +107,7 @@ def wide_gain(mass_matrix, v, w):
                         top = max(top, exponent)
                         count += 1
                     elif exponent - top >= _DROPPED:
-                        unit = math.ldexp(1.0, exponent - top)
+                        unit = ldexp(1.0, exponent - top)
                         p, e = two_product(x, m)
                         q, f = two_product(p, y)
                         f += e * y
@@ -126,7 +129,7 @@ def _half(v, w, difference, is_low):
     """
     scale, shift = (0.25, 2) if min(abs(v), abs(w)) > 2.0**900 else (1.0, 0)
     high, low = two_sum(scale * w, -scale * v if difference else scale * v)
-    mantissa, exponent = math.frexp(low if is_low else high)
+    mantissa, exponent = frexp(low if is_low else high)
     return mantissa, exponent + shift
 
 
@@ -141,7 +144,7 @@ def gain_enclosure(mass_matrix, v, w):
     high, low, radius, underflow = gain(mass_matrix, v, w)
     radius += underflow
     upper = high + (low + radius)
-    if radius == 0.0 or math.isfinite(upper) and (3.0 * underflow <= radius or upper <= 0.0):
+    if radius == 0.0 or isfinite(upper) and (3.0 * underflow <= radius or upper <= 0.0):
         return high + (low - radius), upper, 0
     high, low, radius, exponent = wide_gain(mass_matrix, v, w)
     return high + (low - radius), high + (low + radius), exponent
@@ -151,17 +154,15 @@ def gain_enclosure(mass_matrix, v, w):
 def gain_signs(masses, v, w, signs):
     """Write −1 (no gain), 1 (a gain) or 0 (undecided by the bound) for each of n steps; `masses`:
     n, or one for all."""
-    for k in range(v.shape[0]):
-        lower, upper, _ = gain_enclosure(
-            masses[k] if masses.shape[0] > 1 else masses[0], v[k], w[k]
-        )
+    for k in range(len(v)):
+        lower, upper, _ = gain_enclosure(masses[k] if len(masses) > 1 else masses[0], v[k], w[k])
         signs[k] = -1 if upper <= 0.0 else (1 if lower > 0.0 else 0)
 
 
 @kernel
 def write_step(v, change, factor, w):
     """Write w = v + factor · change."""
-    for k in range(v.shape[0]):
+    for k in range(len(v)):
         w[k] = v[k] + factor * change[k]
 
 
@@ -204,28 +205,26 @@ def _moved(mass_matrix, v, change, alpha, w):
         _, upper, exponent = gain_enclosure(mass_matrix, v, w)
         if upper <= 0.0:
             return True
-        wanted = math.ldexp(0.25 * upper, exponent)
+        wanted = ldexp(0.25 * upper, exponent)
         moved = -1
         to = 0.0
-        shortest = math.inf
-        for i in range(w.shape[0]):
+        shortest = inf
+        for i in range(len(w)):
             slope = 0.0
             mass = mass_matrix[i, i]
-            for j in range(w.shape[0]):
+            for j in range(len(w)):
                 slope += 0.5 * (mass_matrix[i, j] + mass_matrix[j, i]) * w[j]
-            place = abs(np.nextafter(w[i], -math.inf if slope > 0.0 else math.inf) - w[i])
+            place = abs(np.nextafter(w[i], -inf if slope > 0.0 else inf) - w[i])
             square = slope * slope - 2.0 * mass * wanted
             if change[i] == 0.0 or slope == 0.0 or not square >= 0.0:
                 continue
-            length = place * max(
-                np.ceil(2.0 * wanted / (abs(slope) + math.sqrt(square)) / place), 1.0
-            )
-            if (abs(slope) - 0.5 * mass * length) * length >= wanted and math.sqrt(
+            length = place * max(np.ceil(2.0 * wanted / (abs(slope) + sqrt(square)) / place), 1.0)
+            if (abs(slope) - 0.5 * mass * length) * length >= wanted and sqrt(
                 mass
             ) * length < shortest:
                 moved = i
-                to = w[i] - math.copysign(length, slope)
-                shortest = math.sqrt(mass) * length
+                to = w[i] - copysign(length, slope)
+                shortest = sqrt(mass) * length
         if moved < 0:
             return False
         w[moved] = to

@@ -7,7 +7,7 @@ or underflows, and a change of units or of row scale by a power of two changes n
 
 from __future__ import annotations
 
-import math
+from math import frexp, inf, isfinite
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -24,8 +24,15 @@ from iapb.contact.kernels.row_basis import minimum_norm_impulses
 from iapb.contact.kernels.unilateral import PushWork, ShareWork, poisson_impact
 from iapb.numerics.compiled import copy_into, kernel
 from iapb.numerics.double_double import kinetic_energies
-from iapb.numerics.linalg import add_multiple, all_finite, cholesky, dot_of
-from iapb.numerics.schema import Floats, Integers
+from iapb.numerics.linalg import (
+    add_multiple,
+    all_finite,
+    cholesky,
+    dot_of,
+    multiply_by,
+    write_difference,
+)
+from iapb.numerics.schema import FloatPerRow, Floats, Integers, NumberPerVelocity
 
 # |M − Mᵀ| up to this share of √(Mᵢᵢ Mⱼⱼ) counts as rounding of the given M. Energies use M as
 # given, in which the skew part cancels; the Cholesky factor is that of the symmetric part.
@@ -53,22 +60,22 @@ COMPLETE, BUDGET, CANCELLED, REDUCED, NOT_SOLVED, SCALED, REFUSED, NOT_CONVERGED
 class Results(NamedTuple):
     """What n impacts write: d coordinates, c contacts, m tangents each."""
 
-    velocity: np.ndarray  # (n, d) v⁺
-    generalized_impulse: np.ndarray  # (n, d)
-    impulses: np.ndarray  # (n, c)
-    tangential: np.ndarray  # (n, c m)
-    # (n, 7) rank, status, energy change, its lower and its upper bound, clamp, share of friction
-    numbers: np.ndarray
+    velocity: Annotated[Floats, "impact velocity"]  # v⁺
+    generalized_impulse: Annotated[Floats, "impact velocity"]
+    impulses: Annotated[Floats, "impact contact"]
+    tangential: Annotated[Floats, "impact slip"]
+    # rank, status, energy change, its lower and its upper bound, clamp, share of friction
+    numbers: Annotated[Floats, "impact 7"]
 
 
 class ResolveWork(NamedTuple):
     """Scratch of one whole impact."""
 
-    coordinate_exponent: Annotated[Integers, "velocity"]  # s
+    coordinate_exponent: NumberPerVelocity  # s
     row_exponent: Annotated[Integers, "row"]  # r
     # ratio of the caller's rows to the scaled rows, up to one common factor
-    size: Annotated[Floats, "row"]
-    length: Annotated[Floats, "row"]
+    size: FloatPerRow
+    length: FloatPerRow
     impact: ImpactWork  # scaled
     push: PushWork
     friction: FrictionWork
@@ -77,13 +84,15 @@ class ResolveWork(NamedTuple):
 class Batch(NamedTuple):
     """n impacts of equal size, scratch for one, and what they write."""
 
-    masses: np.ndarray  # (n, d, d)
-    jacobians: np.ndarray  # (n, c, d)
-    velocities: np.ndarray  # (n, d)
-    restitution: np.ndarray  # (n,) for (21) in factored form
-    unequal: np.ndarray  # (n, c) of each contact, for Poisson's law in place of (21), or (0, c)
-    tangents: np.ndarray  # (n, c m, d) for Coulomb's friction, added to (21), or (0, c m, d)
-    friction: np.ndarray  # (n, c) likewise
+    masses: Annotated[Floats, "impact velocity velocity"]
+    jacobians: Annotated[Floats, "impact contact velocity"]
+    velocities: Annotated[Floats, "impact velocity"]
+    restitution: Annotated[Floats, "impact"]  # for (21) in factored form
+    # of each contact, for Poisson's law in place of (21); or empty
+    unequal: Annotated[Floats, "unequal contact"]
+    # for Coulomb's friction, added to (21); or empty
+    tangents: Annotated[Floats, "rubbing slip velocity"]
+    friction: Annotated[Floats, "rubbing contact"]
     work: ResolveWork
     share: ShareWork  # empty without Poisson's law
     out: Results
@@ -97,22 +106,22 @@ def resolve_each(batch, tolerance, budget, clamped):
     tolerance : rank tolerance of the rows; 0 selects the default.
     """
     n, c, d = batch.jacobians.shape
-    masses = batch.masses
-    jacobians = batch.jacobians
-    velocities = batch.velocities
     work = batch.work
     out = batch.out
-    rubs = batch.tangents.shape[0] > 0
+    rubs = len(batch.tangents) > 0
     impact = work.impact
     f = work.friction
-    pushes = batch.unequal.shape[0] > 0
+    pushes = len(batch.unequal) > 0
     for m in range(n):
+        M = batch.masses[m]
+        J = batch.jacobians[m]
+        v = batch.velocities[m]
         v_plus = out.velocity[m]
         momentum = out.generalized_impulse[m]
         p = out.impulses[m]
         p_t = out.tangential[m]
         out.numbers[m, 1] = REFUSED
-        sound, k = scale_impact(masses[m], jacobians[m], velocities[m], not rubs, work)
+        sound, k = scale_impact(M, J, v, not rubs, work)
         if not sound:
             return m
         whiten_impact(d, c, rubs or pushes, impact)
@@ -136,11 +145,11 @@ def resolve_each(batch, tolerance, budget, clamped):
             if not rubs:
                 least_norm_impulses(d, c, rank, work, p)
             else:
-                for j in range(p_t.shape[0]):
+                for j in range(len(p_t)):
                     for i in range(d):
                         f.rows[j, i] = np.ldexp(
                             batch.tangents[m, j, i],
-                            work.coordinate_exponent[i] + work.row_exponent[j * c // p_t.shape[0]],
+                            work.coordinate_exponent[i] + work.row_exponent[j * c // len(p_t)],
                         )
                 copy_into(f.coefficient[:c], batch.friction[m])
                 share, factor, met = add_impact_friction(d, c, rank, impact, work.push, f, False, p)
@@ -148,9 +157,9 @@ def resolve_each(batch, tolerance, budget, clamped):
                 status = (COMPLETE if share > _WHOLE else SCALED) if met else REDUCED
                 copy_into(p_t, f.p)
         factor, rounded = unscale_impact(
-            masses[m],
-            jacobians[m],
-            velocities[m],
+            M,
+            J,
+            v,
             clamped,
             k,
             work,
@@ -166,13 +175,13 @@ def resolve_each(batch, tolerance, budget, clamped):
             and all_finite(momentum)
             and all_finite(p)
             and all_finite(p_t)
-            and math.isfinite(out.numbers[m, 2])
+            and isfinite(out.numbers[m, 2])
         ):
             return m
-        if pushes and not separates(jacobians[m], velocities[m], v_plus):
+        if pushes and not separates(J, v, v_plus):
             status = NOT_SOLVED
         if clamp == 0.0:
-            moving = is_moving(jacobians[m], velocities[m], pushes)
+            moving = is_moving(J, v, pushes)
             status = CANCELLED if moving else COMPLETE
         out.numbers[m, 0] = rank
         out.numbers[m, 1] = CANCELLED if rounded else status
@@ -189,18 +198,14 @@ def scale_impact(mass_matrix, jacobian, velocity, scales_rows, work):
     scales_rows : False takes r = 0, unless the rows differ in size by more than 2^_EVEN: the
         normal impulses of friction depend on the scale where they are not unique.
     """
-    d = velocity.shape[0]
+    d = len(velocity)
     s = work.coordinate_exponent
     r = work.row_exponent
     impact = work.impact
     for i in range(d):
-        if not (
-            mass_matrix[i, i] > 0.0
-            and math.isfinite(mass_matrix[i, i])
-            and math.isfinite(velocity[i])
-        ):
+        if not (mass_matrix[i, i] > 0.0 and isfinite(mass_matrix[i, i]) and isfinite(velocity[i])):
             return False, 0
-        s[i] = -(math.frexp(mass_matrix[i, i])[1] // 2)
+        s[i] = -(frexp(mass_matrix[i, i])[1] // 2)
     for i in range(d):
         for j in range(d):
             impact.mass[i, j] = np.ldexp(mass_matrix[i, j], s[i] + s[j])
@@ -221,16 +226,16 @@ def scale_impact(mass_matrix, jacobian, velocity, scales_rows, work):
         impact.v[i] = np.ldexp(velocity[i], -(s[i] + k))
     longest = -_LOWEST_EXPONENT
     shortest = _LOWEST_EXPONENT
-    for i in range(jacobian.shape[0]):
+    for i in range(len(jacobian)):
         r[i] = -_LOWEST_EXPONENT  # of a row of zeros
         for j in range(d):
-            if not math.isfinite(jacobian[i, j]):
+            if not isfinite(jacobian[i, j]):
                 return False, 0
             r[i] = min(r[i], -_exponent(jacobian[i, j]) - s[j])
         if r[i] < -_LOWEST_EXPONENT // 2:
             longest = min(longest, r[i])
             shortest = max(shortest, r[i])
-    for i in range(jacobian.shape[0]):
+    for i in range(len(jacobian)):
         if not scales_rows and (shortest - longest <= _EVEN or r[i] > shortest):
             r[i] = 0
         for j in range(d):
@@ -241,7 +246,7 @@ def scale_impact(mass_matrix, jacobian, velocity, scales_rows, work):
 @kernel
 def _exponent(value):
     """Return the binary exponent; for zero, one that is never the maximum."""
-    return math.frexp(value)[1] if value != 0.0 else _LOWEST_EXPONENT
+    return frexp(value)[1] if value != 0.0 else _LOWEST_EXPONENT
 
 
 @kernel
@@ -250,9 +255,9 @@ def separates(jacobian, v, v_plus):
     velocity before, or than the rounding of its own."""
     largest = 0.0
     separate = True
-    for i in range(jacobian.shape[0]):
+    for i in range(len(jacobian)):
         largest = max(largest, abs(dot_of(jacobian[i], v)))
-    for i in range(jacobian.shape[0]):
+    for i in range(len(jacobian)):
         closing = -dot_of(jacobian[i], v_plus)
         separate = separate and closing <= max(_UNSOLVED * largest, _rounding(jacobian[i], v_plus))
     return separate
@@ -263,7 +268,7 @@ def is_moving(jacobian, v, pushes):
     """Whether a contact moves by more than rounding, or closes if contacts only push; else v⁺ = v is
     right."""
     moving = False
-    for i in range(jacobian.shape[0]):
+    for i in range(len(jacobian)):
         speed = dot_of(jacobian[i], v)
         moving = moving or (-speed if pushes else abs(speed)) > _rounding(jacobian[i], v)
     return moving
@@ -273,7 +278,7 @@ def is_moving(jacobian, v, pushes):
 def _rounding(row, v):
     """Return a bound of the rounding of row · v, some times as large."""
     total = 0.0
-    for k in range(v.shape[0]):
+    for k in range(len(v)):
         total += abs(row[k] * v[k])
     return _ROUNDED * total
 
@@ -335,7 +340,7 @@ def unscale_impact(
     Writes the energy change, its lower and upper bound, unless v⁺ overflows; returns the factor of
     this clamp, and whether scaling rounded an entry of v that a row or the impact touches.
     """
-    d = velocity.shape[0]
+    d = len(velocity)
     s = work.coordinate_exponent
     factor = 1.0
     impact = work.impact
@@ -343,32 +348,30 @@ def unscale_impact(
     for i in range(d):
         touched = impact.v_plus[i] != impact.v[i]
         v_plus[i] = np.ldexp(impact.v_plus[i], s[i] + k) if touched else velocity[i]
-        for m in range(jacobian.shape[0]):
+        for m in range(len(jacobian)):
             touched = touched or jacobian[m, i] != 0.0
         rounded = rounded or touched and np.ldexp(impact.v[i], s[i] + k) != velocity[i]
         momentum[i] = np.ldexp(impact.momentum[i], k - s[i])
-    for i in range(impulses.shape[0]):
+    for i in range(len(impulses)):
         impulses[i] = np.ldexp(impulses[i], work.row_exponent[i] + k)
-    for j in range(tangential.shape[0]):
-        r = work.row_exponent[j * impulses.shape[0] // tangential.shape[0]]
+    for j in range(len(tangential)):
+        r = work.row_exponent[j * len(impulses) // len(tangential)]
         tangential[j] = np.ldexp(tangential[j], r + k)
     if not all_finite(v_plus):
         return factor, rounded
     lower, upper, exponent = gain_enclosure(mass_matrix, velocity, v_plus)
     if clamped and not upper <= 0.0:
-        step = impact.v_change
-        for i in range(d):
-            step[i] = v_plus[i] - velocity[i]
-        factor = passive_step(mass_matrix, velocity, step[:d], 1.0, v_plus)
+        step = impact.v_change[:d]
+        write_difference(step, v_plus, velocity)
+        factor = passive_step(mass_matrix, velocity, step, 1.0, v_plus)
         for i in range(d):
             impact.v_plus[i] = np.ldexp(v_plus[i], -(s[i] + k))
         for scaled in (momentum, impulses, tangential):
-            for i in range(scaled.shape[0]):
-                scaled[i] *= factor
+            multiply_by(scaled, factor)
         lower, upper, exponent = gain_enclosure(mass_matrix, velocity, v_plus)
     change = np.ldexp(kinetic_energies(impact.mass, impact.v, impact.v_plus)[1], 2 * k)
-    low = _outward(lower, exponent - 2, -math.inf)
-    high = _outward(upper, exponent - 2, math.inf)
+    low = _outward(lower, exponent - 2, -inf)
+    high = _outward(upper, exponent - 2, inf)
     change = low if low > change else change
     numbers[2] = high if high < change else change
     numbers[3] = low

@@ -7,7 +7,7 @@ Arrays hold one contact per *column*: `columns[:, i]` is row i of A = J L⁻ᵀ.
 
 from __future__ import annotations
 
-import math
+from math import sqrt
 
 from iapb.numerics.compiled import kernel
 from iapb.numerics.linalg import add_multiple, dot_of, norm_of, orthogonalize
@@ -36,7 +36,7 @@ def _most_violating(closing, size, count, eligible_above):
     shortest = max(eligible_above, _PIVOT_SHARE * _PIVOT_SHARE * longest)
     for i in range(count):
         if size[i] > shortest:
-            speed = abs(closing[i]) / math.sqrt(size[i])
+            speed = abs(closing[i]) / sqrt(size[i])
             if speed > best_speed:
                 best = i
                 best_speed = speed
@@ -47,8 +47,8 @@ def _most_violating(closing, size, count, eligible_above):
 def _next_direction(columns, pivot, basis, rank):
     """Append the pivot's residual row, made orthonormal to the basis; return False if only its
     rounding is left."""
-    q = basis[rank, : columns.shape[0]]
-    for k in range(q.shape[0]):
+    q = basis[rank, : len(columns)]
+    for k in range(len(q)):
         q[k] = columns[k, pivot]
     for turn in range(1 + _PASSES):
         if turn > 0:
@@ -56,7 +56,7 @@ def _next_direction(columns, pivot, basis, rank):
                 add_multiple(q, -dot_of(basis[j], q), basis[j])
         left = norm_of(q)
         if left > 0.0:
-            for k in range(q.shape[0]):
+            for k in range(len(q)):
                 q[k] /= left
         # orthogonal to rounding (Kahan, in Parlett 1980), nearly always in the first pass
         if turn > 0 and left > 0.5:
@@ -78,8 +78,7 @@ def orthonormal_basis(d, count, tolerance, budget, work):
     closing = work.closing
     size = work.size
     overlap = work.overlap
-    closing[:count] = 0.0
-    size[:count] = 0.0
+    closing[:count] = size[:count] = 0.0
     for k in range(d):
         for i in range(count):
             closing[i] += columns[k, i] * u[k]
@@ -91,8 +90,7 @@ def orthonormal_basis(d, count, tolerance, budget, work):
             break
         if _next_direction(columns, pivot, work.basis, rank):
             q = work.basis[rank, :d]
-            overlap[:count] = 0.0
-            size[:count] = 0.0
+            overlap[:count] = size[:count] = 0.0
             for k in range(d):
                 for i in range(count):
                     overlap[i] += q[k] * columns[k, i]
@@ -107,6 +105,12 @@ def orthonormal_basis(d, count, tolerance, budget, work):
             rank += 1
         size[pivot] = 0.0  # its residual is rounding only
     return rank
+
+
+@kernel
+def along_given_row(work, i, impulse):
+    """Return an impulse along unit row i of A as that along the given row; 0 for a row of zeros."""
+    return impulse / work.length[i] if work.length[i] > 0.0 else 0.0
 
 
 @kernel
@@ -141,7 +145,7 @@ def minimum_norm_factors(d, count, rank, length, work):
         before = dot_of(row, row)
         square = orthogonalize(row, tall, j, triangle[:, j])
         reached = square > _NOISE * _NOISE * before
-        triangle[j, j] = math.sqrt(square) if reached else 0.0
+        triangle[j, j] = sqrt(square) if reached else 0.0
         for i in range(count):
             row[i] = row[i] / triangle[j, j] if reached else 0.0
 

@@ -6,7 +6,7 @@ A row maps generalized velocity to normal velocity [m/s]; positive separates.
 from __future__ import annotations
 
 from iapb.numerics.compiled import kernel
-from iapb.numerics.linalg import add, cross, dot, load, norm, scale, store, subtract
+from iapb.numerics.linalg import ZERO, add, cross, dot, load, norm, scale, store, subtract
 
 # An entry n·j of a row (j: motion of the point per unit rate of one dof) is set to exact zero at
 # and below this share of the numbers it was computed from. Kinematics round by about 2e-16 per
@@ -80,7 +80,7 @@ def write_pair_rows(world, state, trees, i, directions, out):
             k = m.last_dof[body]
             while k >= 0:
                 motion, square = motion_and_size(world, state, k, x)
-                for j in range(directions.shape[0]):
+                for j in range(len(directions)):
                     entry = dot(load(directions, j), motion)
                     if not entry * entry <= ROW_NOISE * ROW_NOISE * square:
                         out[j, shift + m.dof_leader[k]] += m.dof_ratio[k] * factor * entry
@@ -132,7 +132,7 @@ def twist(world, state, body):
 
     A point x fixed to the body moves with u + ω × (x − p).
     """
-    p = u = omega = (0.0, 0.0, 0.0)
+    p = u = omega = ZERO
     if body < 0:
         return p, u, omega
     m = world.mechanism

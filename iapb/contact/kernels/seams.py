@@ -23,12 +23,10 @@ _SAME_NORMAL = 1.0 - 5e-7  # cosine of 1e-3 rad: such a contact carries the body
 def leave_out_seams(world, state, contacts, count):
     """Drop new contacts of pairs that the sag of a resting contact explains; return how many
     contacts stay."""
-    kept = 0
-    i = 0
+    kept = i = 0
     while i < count:
         stop = i
-        strikes = False
-        old = False
+        strikes = old = False
         while (
             stop < count
             and contacts.shape_a[stop] == contacts.shape_a[i]
@@ -96,7 +94,7 @@ def joins(contacts, i, body, other):
 @kernel
 def is_apart(world, state, a, b):
     """Whether a pair of shapes does not overlap."""
-    for k in range(world.pairs.shape[0]):
+    for k in range(len(world.pairs)):
         if world.pairs[k, 0] == a and world.pairs[k, 1] == b:
             return (
                 detect(

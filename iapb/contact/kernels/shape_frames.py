@@ -7,7 +7,18 @@ from iapb.contact.geometry import CIRCLE, HALF_SPACE, ContactBuffer
 from iapb.numerics.compiled import kernel
 from iapb.numerics.copying import line_copier
 from iapb.numerics.elementary import hypotenuse
-from iapb.numerics.linalg import add, column, load, norm, placed, scale, store, subtract, transform
+from iapb.numerics.linalg import (
+    add,
+    column,
+    divide,
+    load,
+    norm,
+    placed,
+    scale,
+    store,
+    subtract,
+    transform,
+)
 from iapb.numerics.schema import quantities
 
 
@@ -114,7 +125,7 @@ def balls(shapes, a, b, w, margin, buffer, count):
     sign = 1.0 if a < b else -1.0
     normal = (0.0, sign, 0.0) if flat else (0.0, 0.0, sign)
     if distance > 0.0:
-        normal = (apart[0] / distance, apart[1] / distance, apart[2] / distance)
+        normal = divide(apart, distance)
     point = add(center, scale(0.5 * (distance + radius_b - radius_a), normal))
     return store_contact(shapes, a, b, True, 0, point, normal, gap, buffer, count)
 
@@ -136,7 +147,7 @@ def ball_on_surface(
 def store_contact(shapes, one, other, one_is_a, feature, point, normal, gap, buffer, count):
     """Write a contact at row `count`, its normal given out of shape `other`; return the next row,
     or -1: no room."""
-    if not 0 <= count < buffer.gap.shape[0]:
+    if not 0 <= count < len(buffer.gap):
         return -1
     a, b = (one, other) if one_is_a else (other, one)
     if not one_is_a:

@@ -7,9 +7,9 @@ length, also where centres coincide.
 
 from __future__ import annotations
 
-import math
+from math import inf
 
-from iapb.contact.geometry import BOX, BOX_PAIR_CONTACTS, HALF_SPACE, SPHERE
+from iapb.contact.geometry import BOX, BOX_PAIR_CONTACTS
 from iapb.contact.kernels.shape_frames import (
     ball_on_surface,
     copy_geometry,
@@ -20,19 +20,7 @@ from iapb.contact.kernels.shape_frames import (
     world_center,
 )
 from iapb.numerics.compiled import kernel
-from iapb.numerics.linalg import add, cross, dot, load, norm, scale, subtract
-
-
-@kernel
-def spatial_pair(shapes, a, b, w, margin, buffer, count):
-    """Write the contacts of two spatial shapes, not both spheres; a half-space is always b."""
-    if shapes.kind[b] == HALF_SPACE:
-        return corners_half_space(shapes, a, b, w, margin, buffer, count)
-    if shapes.kind[a] == SPHERE:
-        return sphere_box(shapes, a, b, True, w, margin, buffer, count)
-    if shapes.kind[b] == SPHERE:
-        return sphere_box(shapes, b, a, False, w, margin, buffer, count)
-    return boxes(shapes, a, b, w, margin, buffer, count)
+from iapb.numerics.linalg import ZERO, add, cross, divide, dot, load, norm, scale, subtract
 
 
 @kernel
@@ -76,8 +64,8 @@ def sphere_box(shapes, sphere, box, sphere_is_a, w, margin, buffer, count):
         return count
     axes = world_axes(shapes, box, w)
     region = 0
-    outward = (0.0, 0.0, 0.0)
-    exit_distance = math.inf
+    outward = ZERO
+    exit_distance = inf
     exit_region = 0
     exit_normal = (0.0, 0.0, 1.0)
     for k in range(3):
@@ -97,7 +85,7 @@ def sphere_box(shapes, sphere, box, sphere_is_a, w, margin, buffer, count):
         region = exit_region
         normal = exit_normal
     else:
-        normal = (outward[0] / distance, outward[1] / distance, outward[2] / distance)
+        normal = divide(outward, distance)
     return ball_on_surface(
         shapes,
         sphere,
@@ -187,6 +175,13 @@ def _reach(box, n):
 
 
 @kernel
+def _separation(apart, box, k, other):
+    """Return the separation of two boxes along axis k of the first one."""
+    axis = box[1][k]
+    return abs(dot(apart, axis)) - box[2][k] - _reach(other, axis)
+
+
+@kernel
 def _best_face(apart, A, B, bias):
     """Return the face axis that decides, whether it is a's, its separation, and the largest
     separation of all faces.
@@ -196,9 +191,9 @@ def _best_face(apart, A, B, bias):
     """
     face = 0
     of_a = True
-    best = -math.inf
+    best = -inf
     for k in range(3):
-        separation = abs(dot(apart, A[1][k])) - A[2][k] - _reach(B, A[1][k])
+        separation = _separation(apart, A, k, B)
         if separation > best:
             face = k
             of_a = True
@@ -206,7 +201,7 @@ def _best_face(apart, A, B, bias):
     most = best
     first = face
     for k in range(3):
-        separation = abs(dot(apart, B[1][k])) - B[2][k] - _reach(A, B[1][k])
+        separation = _separation(apart, B, k, A)
         most = max(most, separation)
         lead = bias if of_a and abs(dot(A[1][first], B[1][k])) > FACES_COSINE else 0.0
         if separation > best + lead:
@@ -220,9 +215,8 @@ def _best_face(apart, A, B, bias):
 def _best_edges(apart, A, B):
     """Return the edge directions i of a and j of b of largest separation on their common normal,
     and the separation."""
-    best_i = 0
-    best_j = 0
-    best = -math.inf
+    best_i = best_j = 0
+    best = -inf
     for i in range(3):
         for j in range(3):
             n = cross(A[1][i], B[1][j])
@@ -313,9 +307,9 @@ def clip_faces(
     middle = add(apart, scale(side * half_other[incident], axes_other[incident]))
     first = scale(half_other[k1], axes_other[k1])
     second = scale(half_other[k2], axes_other[k2])
-    c = (dot(middle, u), dot(middle, v), dot(middle, m) - half[face])
-    e1 = (dot(first, u), dot(first, v), dot(first, m))
-    e2 = (dot(second, u), dot(second, v), dot(second, m))
+    c = subtract(_along(middle, u, v, m), (0.0, 0.0, half[face]))
+    e1 = _along(first, u, v, m)
+    e2 = _along(second, u, v, m)
     faces = (2 * face + (1 if sign > 0.0 else 0)) * 6 + 2 * incident + (1 if side > 0.0 else 0)
     origin = add(center, scale(half[face], m))
     kind = 3 if ref_is_a else 4
@@ -352,6 +346,12 @@ def clip_faces(
                 count,
             )
     return keep_widest(buffer, start, count, m) if count - start > BOX_PAIR_CONTACTS else count
+
+
+@kernel
+def _along(a, x, y, z):
+    """Return the components of a along three axes."""
+    return (dot(a, x), dot(a, y), dot(a, z))
 
 
 @kernel
@@ -408,7 +408,7 @@ def keep_widest(buffer, start, count, m):
     They are the deepest, the one farthest from it, and the two that span the largest triangles with
     both, one on each side.
     """
-    if count == buffer.gap.shape[0]:
+    if count == len(buffer.gap):
         return -1
     chosen = start
     for i in range(start + 1, count):

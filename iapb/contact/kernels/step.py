@@ -18,7 +18,7 @@ from iapb.run import COLLIDING, FREE
 @kernel
 def advance(world, state, applied):
     """Advance (q, v) by one step under the generalized force `applied` (d,); return a status."""
-    for k in range(state.v.shape[0]):  # forces and impulses of the step before
+    for k in range(len(state.v)):  # forces and impulses of the step before
         state.penalty_force[k] = state.friction_force[k] = state.impulse[k] = 0.0
     state.impacts.logged[0] = 0
     state.h[0] = world.dt
@@ -42,7 +42,7 @@ def contact_state(state, tool_tree):
     """Return the state of the tool's group; without a tool: COLLIDING if any tree collides, RESTING
     if any rests."""
     found = FREE
-    for t in range(state.state_of_tree.shape[0]):
+    for t in range(len(state.state_of_tree)):
         if tool_tree in (-1, t) and (found == FREE or state.state_of_tree[t] == COLLIDING):
             found = state.state_of_tree[t]
     return found

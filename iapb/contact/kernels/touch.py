@@ -20,7 +20,7 @@ Each impact is passive, and so is each part of the motion; so the step is passiv
 
 from __future__ import annotations
 
-import math
+from math import ceil, inf
 
 from iapb.contact.kernels.collide import contacts_moving_now, resolve_collisions
 from iapb.contact.kernels.contact_set import (
@@ -46,6 +46,7 @@ from iapb.mechanics.kernels.kinematics import forward_kinematics
 from iapb.numerics.compiled import copy_into, kernel
 from iapb.numerics.copying import copier
 from iapb.numerics.linalg import (
+    ZERO,
     add_multiple,
     dot,
     load,
@@ -76,8 +77,8 @@ def cut_at_touch(world, state, applied):
         keep_start(state)
         while status == MET:  # each time, two components have become one
             status = OK
-            back_to_start(state)
-            for t in range(cut.component.shape[0]):
+            back_to_start(world, state)
+            for t in range(world.trees):
                 if status == OK and cut.component[t] == t and cut.touches[t]:
                     status = cut_component(world, state, applied, t)
         end_step(world, state)
@@ -162,7 +163,7 @@ def gather_components(world, state, count):
     """Write the components of groups that new contacts link; return whether there are any."""
     cut = state.cut
     some = False
-    for t in range(cut.component.shape[0]):
+    for t in range(world.trees):
         cut.component[t] = state.group_of_tree[t]
         cut.touches[t] = False
     for i in range(count):
@@ -186,13 +187,13 @@ def find_fast_pairs(world, state):
     cut.fast_count[0] = 0
     quick = False
     fastest = 0.0
-    for k in range(state.v.shape[0]):
+    for k in range(len(state.v)):
         fastest = max(fastest, abs(state.v[k]))
     if world.dt * fastest * sweep.lever <= 0.5 * sweep.thinnest:
         return False
-    for i in range(shapes.kind.shape[0]):
+    for i in range(len(shapes.kind)):
         quick = quick or way_of(world, state, i) > 0.5 * sweep.thinnest
-    for k in range(world.pairs.shape[0] if quick else 0):
+    for k in range(len(world.pairs) if quick else 0):
         a = world.pairs[k, 0]
         b = world.pairs[k, 1]
         way = way_of(world, state, a) + way_of(world, state, b)
@@ -202,7 +203,7 @@ def find_fast_pairs(world, state):
             continue
         apart = subtract(middle_of(world, state, a), middle_of(world, state, b))
         near = sweep.radius[a] + sweep.radius[b] + way
-        if dot(apart, apart) <= near * near and count < cut.fast.shape[0]:
+        if dot(apart, apart) <= near * near and count < len(cut.fast):
             cut.fast[count] = k
             count += 1
             link(world, state, shapes.body[a], shapes.body[b])
@@ -220,7 +221,7 @@ def middle_of(world, state, i):
 def way_of(world, state, i):
     """Return a bound of how far a point of shape i moves in a step at its present velocity [m]."""
     body = world.shapes.body[i]
-    if body < 0 or world.sweep.radius[i] == math.inf:
+    if body < 0 or world.sweep.radius[i] == inf:
         return 0.0
     p, u, omega = twist(world, state, body)
     arm = subtract(middle_of(world, state, i), p)
@@ -235,7 +236,7 @@ def link(world, state, body, other):
     one, two = trees_of_bodies(world, body, other)
     first = min(cut.component[one], cut.component[two])
     last = max(cut.component[one], cut.component[two])
-    for t in range(cut.component.shape[0]):
+    for t in range(world.trees):
         if cut.component[t] == last:
             cut.component[t] = first
     cut.touches[first] = True
@@ -253,11 +254,11 @@ def keep_start(state):
 
 
 @kernel
-def back_to_start(state):
+def back_to_start(world, state):
     """Take back what parts of the step have changed, but for q and v."""
     copy_start(state, state.cut.start)
     state.impacts.logged[0] = state.cut.logged[0]
-    for t in range(state.cut.struck.shape[0]):
+    for t in range(world.trees):
         state.cut.struck[t] = state.state_of_tree[t] == COLLIDING
 
 
@@ -282,7 +283,7 @@ def cut_component(world, state, applied, root):
         some, outside = reached(world, state)
         if outside:
             return MET
-        full = state.impacts.logged[0] + size > state.impacts.group.shape[0]
+        full = state.impacts.logged[0] + size > len(state.impacts.group)
         if parts == MOST or full:  # what is left strikes in the next step
             break
         end = left
@@ -314,7 +315,7 @@ def cut_component(world, state, applied, root):
     add_part(state, left)
     copy_into(cut.end.q, state.q)
     copy_into(cut.end.v, state.v)
-    for k in range(state.v.shape[0]):
+    for k in range(len(state.v)):
         if state.moving[world.tree_of_dof[k]]:
             cut.end.penalty_force[k] = cut.penalty[k] / world.dt
             cut.end.friction_force[k] = cut.friction[k] / world.dt
@@ -326,7 +327,7 @@ def begin_component(world, state, root):
     """Choose the trees that move and the contacts that take part; return the number of trees."""
     cut = state.cut
     size = 0
-    for t in range(state.moving.shape[0]):
+    for t in range(world.trees):
         state.moving[t] = cut.component[t] == root
         size += state.moving[t]
     for i in range(state.contact_count[0]):
@@ -366,9 +367,9 @@ def move_part(world, state, applied, h):
 def move_others_to_end(world, state, q, v):
     """Write q and v of the trees that move now; put all others at the end of the step."""
     end = state.cut.end
-    for i in range(q.shape[0]):
+    for i in range(len(q)):
         state.q[i] = q[i] if state.moving[world.tree_of_coordinate[i]] else end.q[i]
-    for k in range(v.shape[0]):
+    for k in range(len(v)):
         state.v[k] = v[k] if state.moving[world.tree_of_dof[k]] else end.v[k]
 
 
@@ -397,28 +398,32 @@ def move_to_overlap(world, state, applied, left):
     samples = 1.0
     status = OK
     for j in range(cut.fast_count[0]):
-        a = world.pairs[cut.fast[j], 0]
-        b = world.pairs[cut.fast[j], 1]
-        if state.moving[world.tree_of_body[world.shapes.body[a]]]:
+        a, b, moves = fast_pair(world, state, j)
+        if moves:
             way = way_of(world, state, a) + way_of(world, state, b)
             thin = min(world.sweep.thin[a], world.sweep.thin[b])
-            samples = max(samples, math.ceil(left / world.dt * way / (0.5 * thin)))
+            samples = max(samples, ceil(left / world.dt * way / (0.5 * thin)))
     samples = min(samples, MOST_SAMPLES)
     for n in range(1, int(samples)):
         h = left * (n / samples)
         status = move_part(world, state, applied, h)
         if status != OK:
             return h, status
-        forward_kinematics(world.mechanism, state.q, state.body)
         for j in range(cut.fast_count[0]):
-            a = world.pairs[cut.fast[j], 0]
-            b = world.pairs[cut.fast[j], 1]
-            if state.moving[world.tree_of_body[world.shapes.body[a]]]:
+            a, b, moves = fast_pair(world, state, j)
+            if moves:
                 cut.pairs[0, 0] = a
                 cut.pairs[0, 1] = b
                 if overlaps_now(world, state):
                     return h, OK
     return left, move_part(world, state, applied, left)
+
+
+@kernel
+def fast_pair(world, state, j):
+    """Return the shapes of fast pair j, and whether they move now."""
+    pair = world.pairs[state.cut.fast[j]]
+    return pair[0], pair[1], state.moving[world.tree_of_body[world.shapes.body[pair[0]]]]
 
 
 @kernel
@@ -455,7 +460,7 @@ def move_to_touch(world, state, applied, left):
     low = 0.0
     high = left
     _, _, guess = next_touch(world, state, pairs, stops, left)
-    expected = math.inf  # when the touch comes, as seen from `low`
+    expected = inf  # when the touch comes, as seen from `low`
     for turn in range(SEARCHES):
         if not low < guess < high:
             guess = expected
@@ -512,12 +517,10 @@ def next_touch(world, state, pairs, stops, h):
     found = state.arriving
     count = gaps_of_pairs(world, state, pairs)
     if stops:
-        count = add_stops(world, state, found, count, math.inf)
+        count = add_stops(world, state, found, count, inf)
     velocities_and_marks(world, state, count)
-    overlaps = False
-    touches = False
-    earlier = math.inf
-    later = math.inf
+    overlaps = touches = False
+    earlier = later = inf
     for i in range(count):
         if not found.is_new[i] or not takes_part(world, state, found, i):
             continue
@@ -527,7 +530,7 @@ def next_touch(world, state, pairs, stops, h):
             gap += CLOSE
         x, y, z = load(found.point, i)
         rounded = TOUCHING * (1.0 + abs(x) + abs(y) + abs(z))
-        when = h - gap / speed if speed < 0.0 else math.inf
+        when = h - gap / speed if speed < 0.0 else inf
         if gap < -rounded:
             overlaps = True
             earlier = min(earlier, when)
@@ -571,7 +574,7 @@ def gaps_of_pairs(world, state, pairs):
         world.shapes,
         state.cut.pairs[:pairs],
         state.body,
-        math.inf,
+        inf,
         state.arriving,
     )
 
@@ -601,7 +604,7 @@ def take_contacts(world, state):
     copy_contacts(before, now, count)
     copy_into(state.row_impulse[:count], state.contact_impulse)
     state.contact_count[1] = count
-    room = now.gap.shape[0]  # for those that are apart
+    room = len(now.gap)  # for those that are apart
     for i in range(found_count):
         room -= takes_part(world, state, found, i)
     for i in range(count):
@@ -618,23 +621,21 @@ def take_contacts(world, state):
                 continue
         copy_contact(now, kept, before, i)
         if not before.idle[i]:
-            now.gap[kept] = 0.0
-            now.normal_force[kept] = 0.0
+            now.gap[kept] = now.normal_force[kept] = 0.0
             now.idle[kept] = True
-            store(now.friction_force, kept, (0.0, 0.0, 0.0))
+            store(now.friction_force, kept, ZERO)
         state.contact_impulse[kept] = state.row_impulse[i]
         kept += 1
     begin = 0
     for i in range(found_count):
         if not takes_part(world, state, found, i):
             continue
-        if kept == now.gap.shape[0]:
+        if kept == len(now.gap):
             return False
         copy_contact(now, kept, found, i)
         now.mark[kept] = 0
-        now.normal_force[kept] = 0.0
-        state.contact_impulse[kept] = 0.0
-        store(now.friction_force, kept, (0.0, 0.0, 0.0))
+        now.normal_force[kept] = state.contact_impulse[kept] = 0.0
+        store(now.friction_force, kept, ZERO)
         state.contact_count[0] = kept + 1
         old = contact_before(state, kept, begin)
         if old >= 0:
@@ -672,7 +673,7 @@ def strike(world, state, flies):
     if not locate(world, state):
         return False
     classify(world, state, state.contact_count[0])
-    for t in range(state.moving.shape[0]):
+    for t in range(world.trees):
         state.cut.struck[t] = state.cut.struck[t] or state.state_of_tree[t] == COLLIDING
     resolve_collisions(world, state)
     if flies:
@@ -685,7 +686,7 @@ def let_go(world, state):
     """Take contacts that an impact has separated out of the forces of the rest of the step."""
     contacts = state.contacts
     some = False
-    for t in range(state.moving.shape[0]):
+    for t in range(world.trees):
         collides = state.moving[t] and state.state_of_tree[t] == COLLIDING
         some = some or collides
         state.rests[t] = state.rests[t] and not collides
@@ -709,7 +710,7 @@ def end_step(world, state):
     copy_end(state, cut.end)
     state.contacts.idle[: state.contact_count[0]] = False
     cut.elapsed[0] = 0.0
-    for t in range(state.moving.shape[0]):
+    for t in range(world.trees):
         state.moving[t] = True
         if cut.struck[t]:
             state.state_of_tree[t] = COLLIDING

@@ -8,14 +8,21 @@ factors.
 
 from __future__ import annotations
 
-import math
+from math import sqrt
 from typing import Annotated, NamedTuple
 
 from iapb.contact.kernels.impact import apply_change, write_change
-from iapb.contact.kernels.row_basis import minimum_norm_factors, orthonormal_basis
+from iapb.contact.kernels.row_basis import along_given_row, minimum_norm_factors, orthonormal_basis
 from iapb.numerics.compiled import copy_into, kernel
-from iapb.numerics.linalg import add_multiple, dot_of, norm_of, orthogonalize
-from iapb.numerics.schema import Booleans, Floats, Integers
+from iapb.numerics.linalg import add_multiple, dot_of, norm_of, orthogonalize, write_difference
+from iapb.numerics.schema import (
+    Booleans,
+    FloatPerRow,
+    FloatPerVelocity,
+    Floats,
+    NumberPerVelocity,
+    VelocityMatrix,
+)
 
 # A row counts as closing if its speed exceeds this share, times d, of the terms that it is summed
 # from: some times their rounding.
@@ -32,26 +39,26 @@ _NO_IMPULSE = 1e-13
 class PushWork(NamedTuple):
     """Scratch of impulses that only push."""
 
-    q: Annotated[Floats, "velocity velocity"]  # orthonormal directions of the passive rows
-    triangle: Annotated[Floats, "velocity velocity"]
-    solution: Annotated[Floats, "velocity"]
-    passive: Annotated[Integers, "velocity"]  # rows that push
+    q: VelocityMatrix  # orthonormal directions of the passive rows
+    triangle: VelocityMatrix
+    solution: FloatPerVelocity
+    passive: NumberPerVelocity  # rows that push
     held: Annotated[Booleans, "row"]  # the row is passive
     banned: Annotated[Booleans, "row"]  # the row depends on the passive rows to rounding
-    more: Annotated[Floats, "row"]  # impulses of the restitution phase beyond E p_c
-    earlier: Annotated[Floats, "velocity"]  # terms that b was summed from, with their rounding
-    terms: Annotated[Floats, "velocity"]  # of the residual: earlier + |b| + p of each row in it
+    more: FloatPerRow  # impulses of the restitution phase beyond E p_c
+    earlier: FloatPerVelocity  # terms that b was summed from, with their rounding
+    terms: FloatPerVelocity  # of the residual: earlier + |b| + p of each row in it
 
 
 class ShareWork(NamedTuple):
     """Scratch of `share_compression`; `velocity` is the number of rows and one more."""
 
     tall: Annotated[Floats, "velocity row"]
-    aim: Annotated[Floats, "velocity"]
-    residual: Annotated[Floats, "velocity"]
-    weight: Annotated[Floats, "row"]  # 1/√(number of equal rows); 0 where p_c = 0 for certain
-    shared: Annotated[Floats, "row"]
-    slack: Annotated[Floats, "row"]
+    aim: FloatPerVelocity
+    residual: FloatPerVelocity
+    weight: FloatPerRow  # 1/√(number of equal rows); 0 where p_c = 0 for certain
+    shared: FloatPerRow
+    slack: FloatPerRow
     push: PushWork
 
 
@@ -63,16 +70,14 @@ def push_only(rows, count, b, p, residual, work):
     rows : (d, ≥count) unit rows of A as columns; p : (≥count,); residual : (d,); work : a
         `PushWork`.
     """
-    d = b.shape[0]
-    size = 0
-    known = 0
+    d = len(b)
+    size = known = 0
     terms = work.terms[:d]
     copy_into(residual, b)
     for k in range(d):
         terms[k] = work.earlier[k] + abs(b[k])
     p[:count] = 0.0
-    work.held[:count] = False
-    work.banned[:count] = False
+    work.held[:count] = work.banned[:count] = False
     for _ in range(10 * (count + d) + 10):
         entering = -1
         speed = 0.0
@@ -114,7 +119,7 @@ def _size_of(row, terms):
     """Return the sum of the terms that a unit row meets. Rounding of a row is a share of its length,
     not of its entries."""
     total = 0.0
-    for k in range(terms.shape[0]):
+    for k in range(len(terms)):
         total += terms[k] if row[k] != 0.0 else 0.0
     return total
 
@@ -127,12 +132,12 @@ def _solve_passive(rows, b, known, size, work):
     triangle = work.triangle
     solution = work.solution
     for j in range(known, size):
-        copy_into(q[j, : b.shape[0]], rows[:, work.passive[j]])
-        square = orthogonalize(q[j, : b.shape[0]], q, j, triangle[:, j])
+        copy_into(q[j, : len(b)], rows[:, work.passive[j]])
+        square = orthogonalize(q[j, : len(b)], q, j, triangle[:, j])
         if square <= _DEPENDENT * _DEPENDENT:
             return j
-        triangle[j, j] = math.sqrt(square)
-        for k in range(b.shape[0]):
+        triangle[j, j] = sqrt(square)
+        for k in range(len(b)):
             q[j, k] /= triangle[j, j]
     for j in range(size - 1, -1, -1):
         total = -dot_of(q[j], b)
@@ -212,7 +217,7 @@ def share_compression(d, count, restitution, tolerance, compressed, impulses, wo
             for k in range(d):
                 apart += (rows[k, i] - rows[k, j]) ** 2
             equal += restitution[i] == restitution[j] and apart <= tolerance * tolerance
-        weight[i] = 1.0 / math.sqrt(equal) if tight[i] else 0.0
+        weight[i] = 1.0 / sqrt(equal) if tight[i] else 0.0
         kinds += weight[i] * weight[i]
         shared[i] = left[i] = impulses[i] / weight[i] if tight[i] else 0.0
     norm = norm_of(shared)
@@ -277,13 +282,12 @@ def poisson_impact(d, count, restitution, tolerance, clamped, work, push, share,
     push.earlier[:d] = 0.0
     if not solved:
         return -1, 1.0
-    for k in range(d):
-        work.change[k] = final[k] - u[k]
+    write_difference(work.change[:d], final, u)
     write_change(d, work)
     clamp = apply_change(d, clamped, work)
     pushing = 0
     for i in range(count):
         impulses[i] += push.more[i]
         pushing += impulses[i] > 0.0
-        impulses[i] = clamp * impulses[i] / work.length[i] if work.length[i] > 0.0 else 0.0
+        impulses[i] = along_given_row(work, i, clamp * impulses[i])
     return pushing, clamp

@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from iapb.numerics.schema import Booleans, Floats, Integers, zeros_of
+from iapb.numerics.schema import Booleans, Floats, Integers, VectorPerBody, zeros_of
 
 
 class MechanismArrays(NamedTuple):
@@ -43,18 +43,18 @@ class Workspace(NamedTuple):
     four fields."""
 
     rotation: Annotated[Floats, "body 3 3"]  # body axes as columns
-    position: Annotated[Floats, "body 3"]  # [m] body origin
-    center: Annotated[Floats, "body 3"]  # [m] centre of mass
+    position: VectorPerBody  # [m] body origin
+    center: VectorPerBody  # [m] centre of mass
     axis: Annotated[Floats, "dof 3"]  # unit, axis of each dof
     composite_mass: Annotated[Floats, "body"]  # mass of the body and all bodies that it carries
-    composite_center: Annotated[Floats, "body 3"]
+    composite_center: VectorPerBody
     composite_inertia: Annotated[Floats, "body 3 3"]  # about the composite centre
-    angular_velocity: Annotated[Floats, "body 3"]
-    linear_velocity: Annotated[Floats, "body 3"]  # of the body origin
-    angular_acceleration: Annotated[Floats, "body 3"]
-    linear_acceleration: Annotated[Floats, "body 3"]  # of the body origin, minus gravity
-    force: Annotated[Floats, "body 3"]  # that the joint transmits to the body
-    moment: Annotated[Floats, "body 3"]  # about the body origin
+    angular_velocity: VectorPerBody
+    linear_velocity: VectorPerBody  # of the body origin
+    angular_acceleration: VectorPerBody
+    linear_acceleration: VectorPerBody  # of the body origin, minus gravity
+    force: VectorPerBody  # that the joint transmits to the body
+    moment: VectorPerBody  # about the body origin
     # first nq: the q of the first four fields; NaN: not computed yet
     placed_q: Annotated[Floats, "placed"]
 

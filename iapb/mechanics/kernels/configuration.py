@@ -10,7 +10,7 @@ from math import sqrt
 from iapb.mechanics.joints import CONTINUOUS, FREE_FLYER, SPHERICAL
 from iapb.numerics.compiled import kernel
 from iapb.numerics.elementary import arc_tangent, sine_cosine
-from iapb.numerics.linalg import add, cross, dot, norm, scale
+from iapb.numerics.linalg import add, cross, dot, norm, put, scale, subtract, three
 
 # Below this angle [rad] the series of the screw coefficients (two terms kept) is exact to 1e-17,
 # while the closed forms lose digits: 1 - cos keeps eps / angle^2.
@@ -18,11 +18,25 @@ SMALL_ANGLE = 1e-4
 
 
 @kernel
-def turn_vector(x, y, z, s, a):
-    """Rotate a by the unit quaternion (x, y, z, s)."""
-    axis = (x, y, z)
+def turn_vector(q, i, a):
+    """Rotate a by the unit quaternion at q[i]."""
+    axis = three(q, i)
     twice = scale(2.0, cross(axis, a))
-    return add(a, add(scale(s, twice), cross(axis, twice)))
+    return add(a, add(scale(q[i + 3], twice), cross(axis, twice)))
+
+
+@kernel
+def turn_vector_back(q, i, a):
+    """Rotate a by the inverse of the unit quaternion at q[i]."""
+    axis = scale(-1.0, three(q, i))
+    twice = scale(2.0, cross(axis, a))
+    return add(a, add(scale(q[i + 3], twice), cross(axis, twice)))
+
+
+@kernel
+def multiply(a, s, b, t):
+    """Return the product of two quaternions, given as vector and scalar."""
+    return add(add(scale(s, b), scale(t, a)), cross(a, b)), s * t - dot(a, b)
 
 
 @kernel
@@ -31,15 +45,11 @@ def turn_quaternion(q, i, phi, out):
     angle = norm(phi)
     sin, t = sine_cosine(0.5 * angle)
     factor = 0.5 - angle * angle / 48.0 if angle < SMALL_ANGLE else sin / angle
-    b = scale(factor, phi)
-    a = (q[i], q[i + 1], q[i + 2])
-    s = q[i + 3]
-    vector = add(add(scale(s, b), scale(t, a)), cross(a, b))
-    scalar = s * t - dot(a, b)
+    vector, scalar = multiply(three(q, i), q[i + 3], scale(factor, phi), t)
     length = sqrt(dot(vector, vector) + scalar * scalar)
     if t < 0.0:  # of the two quaternions of this rotation, the one nearer to the old one
         length = -length
-    out[i], out[i + 1], out[i + 2] = scale(1.0 / length, vector)
+    put(out, i, scale(1.0 / length, vector))
     out[i + 3] = scalar / length
 
 
@@ -52,11 +62,11 @@ def integrate_in_space(m, b, q, v, dt, out):
     """
     i = m.q_start[b]
     k = m.v_start[b]
+    u = scale(dt, three(v, k))
     if m.kind[b] == SPHERICAL:
-        turn_quaternion(q, i, (v[k] * dt, v[k + 1] * dt, v[k + 2] * dt), out)
+        turn_quaternion(q, i, u, out)
         return
-    u = (v[k] * dt, v[k + 1] * dt, v[k + 2] * dt)
-    phi = (v[k + 3] * dt, v[k + 4] * dt, v[k + 5] * dt)
+    phi = scale(dt, three(v, k + 3))
     angle = norm(phi)
     square = angle * angle
     if angle < SMALL_ANGLE:
@@ -69,10 +79,7 @@ def integrate_in_space(m, b, q, v, dt, out):
         second = (angle - whole) / (square * angle)
     turned = cross(phi, u)
     path = add(u, add(scale(first, turned), scale(second, cross(phi, turned))))
-    path = turn_vector(q[i + 3], q[i + 4], q[i + 5], q[i + 6], path)
-    out[i] = q[i] + path[0]
-    out[i + 1] = q[i + 1] + path[1]
-    out[i + 2] = q[i + 2] + path[2]
+    put(out, i, add(three(q, i), turn_vector(q, i + 3, path)))
     turn_quaternion(q, i + 3, phi, out)
 
 
@@ -114,7 +121,7 @@ def integrate_body(m, b, q, v, dt, out):
 @kernel
 def integrate(m, q, v, dt, out):
     """out (nq,) <- q moved for dt with the constant velocity v; out may be q itself."""
-    for b in range(m.kind.shape[0]):
+    for b in range(len(m.kind)):
         integrate_body(m, b, q, v, dt, out)
 
 
@@ -122,12 +129,7 @@ def integrate(m, q, v, dt, out):
 def quaternion_difference(q0, q1, i):
     """Return the rotation vector phi, in the body axes of q0, with q1 = q0 * exp(phi / 2) and |phi|
     <= pi."""
-    a = (-q0[i], -q0[i + 1], -q0[i + 2])
-    s = q0[i + 3]
-    b = (q1[i], q1[i + 1], q1[i + 2])
-    t = q1[i + 3]
-    vector = add(add(scale(s, b), scale(t, a)), cross(a, b))
-    scalar = s * t - dot(a, b)
+    vector, scalar = multiply(scale(-1.0, three(q0, i)), q0[i + 3], three(q1, i), q1[i + 3])
     if scalar < 0.0:  # q and -q are the same rotation: take the shorter way
         vector = scale(-1.0, vector)
         scalar = -scalar
@@ -146,11 +148,10 @@ def difference_in_space(m, b, q0, q1, out):
     i = m.q_start[b]
     k = m.v_start[b]
     if m.kind[b] == SPHERICAL:
-        out[k], out[k + 1], out[k + 2] = quaternion_difference(q0, q1, i)
+        put(out, k, quaternion_difference(q0, q1, i))
         return
     phi = quaternion_difference(q0, q1, i + 3)
-    path = (q1[i] - q0[i], q1[i + 1] - q0[i + 1], q1[i + 2] - q0[i + 2])
-    path = turn_vector(-q0[i + 3], -q0[i + 4], -q0[i + 5], q0[i + 6], path)
+    path = turn_vector_back(q0, i + 3, subtract(three(q1, i), three(q0, i)))
     angle = norm(phi)
     square = angle * angle
     if angle < SMALL_ANGLE:
@@ -160,14 +161,14 @@ def difference_in_space(m, b, q0, q1, out):
         factor = (1.0 - 0.5 * angle * cos / sin) / square
     turned = cross(phi, path)
     path = add(path, add(scale(-0.5, turned), scale(factor, cross(phi, turned))))
-    out[k], out[k + 1], out[k + 2] = path
-    out[k + 3], out[k + 4], out[k + 5] = phi
+    put(out, k, path)
+    put(out, k + 3, phi)
 
 
 @kernel
 def difference(m, q0, q1, out):
     """out (d,) <- the v with integrate(q0, v, 1) = q1, by the shortest rotations."""
-    for b in range(m.kind.shape[0]):
+    for b in range(len(m.kind)):
         kind = m.kind[b]
         i = m.q_start[b]
         k = m.v_start[b]

@@ -9,6 +9,7 @@ positive terms.
 from iapb.mechanics.joints import FREE_FLYER
 from iapb.numerics.compiled import kernel
 from iapb.numerics.linalg import (
+    ZERO,
     accumulate,
     add,
     cross,
@@ -17,6 +18,7 @@ from iapb.numerics.linalg import (
     scale,
     store,
     subtract,
+    three,
     transform,
     transform_back,
 )
@@ -34,7 +36,7 @@ def composite_bodies(m, w):
 
     Two bodies together have the inertia I1 + I2 + mu (|r|^2 1 - r r^T), mu = m1 m2 / (m1 + m2).
     """
-    for b in range(m.kind.shape[0]):
+    for b in range(len(m.kind)):
         w.composite_mass[b] = m.mass[b]
         store(w.composite_center, b, load(w.center, b))
         rotation = w.rotation[b]  # the inertia in world axes is R I R^T
@@ -54,7 +56,7 @@ def composite_bodies(m, w):
         store(own, 0, (xx, xy, xz))
         store(own, 1, (xy, yy, yz))
         store(own, 2, (xz, yz, zz))
-    for b in range(m.kind.shape[0] - 1, -1, -1):
+    for b in range(len(m.kind) - 1, -1, -1):
         into = m.parent[b]
         if into >= 0:
             m1 = w.composite_mass[into]
@@ -87,8 +89,8 @@ def mass_matrix(m, w, out):
     """
     composite_bodies(m, w)
     out[:] = 0.0
-    alone = m.dof_body.shape[0] == out.shape[0]
-    for j in range(m.dof_body.shape[0]):
+    alone = len(m.dof_body) == len(out)
+    for j in range(len(m.dof_body)):
         b = m.dof_body[j]
         a = load(w.axis, j)
         c = load(w.composite_center, b)
@@ -97,7 +99,7 @@ def mass_matrix(m, w, out):
             angular = transform(w.composite_inertia, b, a)
         else:
             linear = scale(w.composite_mass[b], a)
-            angular = (0.0, 0.0, 0.0)
+            angular = ZERO
         i = j
         while i >= 0:
             if m.dof_rotates[i]:
@@ -128,8 +130,8 @@ def add_to_leaders(m, i, j, entry, out):
 def gravity(m, w, g, out):
     """out (d,) <- G(q) = d(potential energy)/dq for the gravity field g (3,) [m/s^2], world
     axes."""
-    for b in range(m.kind.shape[0]):
-        store(w.force, b, scale(-m.mass[b], (g[0], g[1], g[2])))
+    for b in range(len(m.kind)):
+        store(w.force, b, scale(-m.mass[b], three(g, 0)))
         store(
             w.moment, b, cross(subtract(load(w.center, b), load(w.position, b)), load(w.force, b))
         )
@@ -140,7 +142,7 @@ def gravity(m, w, g, out):
 def project_forces(m, w, out):
     """Sum forces and moments (about body origins) from the leaves inwards; out (d,) <- their dof
     components."""
-    for b in range(m.kind.shape[0] - 1, -1, -1):
+    for b in range(len(m.kind) - 1, -1, -1):
         f = load(w.force, b)
         n = load(w.moment, b)
         for k in range(m.v_start[b], m.v_start[b] + m.v_count[b]):
@@ -151,7 +153,7 @@ def project_forces(m, w, out):
             lever = subtract(load(w.position, b), load(w.position, parent))
             accumulate(w.force, parent, f)
             accumulate(w.moment, parent, add(n, cross(lever, f)))
-    for k in range(out.shape[0], m.dof_body.shape[0]):
+    for k in range(len(out), len(m.dof_body)):
         total = w.moment if m.dof_rotates[k] else w.force
         share = dot(load(w.axis, k), load(total, m.dof_body[k]))
         out[m.dof_leader[k]] += m.dof_ratio[k] * share
@@ -161,8 +163,7 @@ def project_forces(m, w, out):
 def relative_motion(m, w, b, rates):
     """Return linear and angular part of the joint's motion, in world axes, for the given rates of
     its dofs."""
-    linear = (0.0, 0.0, 0.0)
-    angular = (0.0, 0.0, 0.0)
+    linear = angular = ZERO
     for k in range(m.v_start[b], m.v_start[b] + m.v_count[b]):
         rate = m.dof_ratio[k] * rates[m.dof_leader[k]]
         if m.dof_rotates[k]:
@@ -175,13 +176,12 @@ def relative_motion(m, w, b, rates):
 @kernel
 def body_velocities(m, w, v):
     """Write the angular velocity of each body and the velocity of its origin."""
-    zero = (0.0, 0.0, 0.0)
-    for b in range(m.kind.shape[0]):
+    for b in range(len(m.kind)):
         parent = m.parent[b]
         linear, angular = relative_motion(m, w, b, v)
-        omega = load(w.angular_velocity, parent) if parent >= 0 else zero
-        origin = load(w.linear_velocity, parent) if parent >= 0 else zero
-        r = subtract(load(w.position, b), load(w.position, parent)) if parent >= 0 else zero
+        omega = load(w.angular_velocity, parent) if parent >= 0 else ZERO
+        origin = load(w.linear_velocity, parent) if parent >= 0 else ZERO
+        r = subtract(load(w.position, b), load(w.position, parent)) if parent >= 0 else ZERO
         store(w.angular_velocity, b, add(omega, angular))
         store(w.linear_velocity, b, add(add(origin, cross(omega, r)), linear))
 
@@ -197,11 +197,11 @@ def inverse_dynamics(m, w, v, dv, g, out):
     Then, with r = c - p and the inertia I in body axes, f = m (a + alpha x r + omega x (omega x r))
     and n = R (I R^T alpha + R^T omega x I R^T omega) + r x f about p.
     """
-    for b in range(m.kind.shape[0]):
+    for b in range(len(m.kind)):
         parent = m.parent[b]
         u, s = relative_motion(m, w, b, v)
         omega = s
-        alpha = (0.0, 0.0, 0.0)
+        alpha = ZERO
         a = (0.0 - g[0], 0.0 - g[1], 0.0 - g[2])
         if parent >= 0:
             carried = load(w.angular_velocity, parent)
@@ -213,7 +213,7 @@ def inverse_dynamics(m, w, v, dv, g, out):
             a = add(a, cross(carried, add(cross(carried, r), scale(2.0, u))))
         if m.kind[b] == FREE_FLYER:
             a = add(a, cross(s, u))
-        if dv.shape[0] > 0:
+        if len(dv) > 0:
             changed_u, changed_s = relative_motion(m, w, b, dv)
             alpha = add(alpha, changed_s)
             a = add(a, changed_u)
@@ -235,4 +235,4 @@ def inverse_dynamics(m, w, v, dv, g, out):
 def bias(m, w, v, out):
     """out (d,) <- B(q, v): Coriolis and centripetal generalized forces, `inverse_dynamics` without
     dv/dt and weight."""
-    inverse_dynamics(m, w, v, v[:0], (0.0, 0.0, 0.0), out)
+    inverse_dynamics(m, w, v, v[:0], ZERO, out)

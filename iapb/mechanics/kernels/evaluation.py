@@ -6,21 +6,30 @@ Some of them check configurations, which come from the user; no other kernel che
 from math import sqrt
 
 from iapb.mechanics.joints import FREE_FLYER
-from iapb.mechanics.kernels.configuration import difference, is_vector, own_count, turn_vector
+from iapb.mechanics.kernels.configuration import (
+    difference,
+    is_vector,
+    own_count,
+    turn_vector,
+    turn_vector_back,
+)
 from iapb.mechanics.kernels.dynamics import bias, body_velocities, mass_matrix, turned_inertia
 from iapb.mechanics.kernels.kinematics import add_point_force, forward_kinematics
 from iapb.numerics.compiled import kernel
 from iapb.numerics.elementary import arc_tangent
 from iapb.numerics.linalg import (
+    ZERO,
     add,
     all_finite,
     cholesky,
     cross,
     dot,
     load,
+    put,
     scale,
     solve_mass,
     subtract,
+    three,
 )
 
 # Tolerance on the length of a given quaternion or (cos, sin) pair: single precision input passes.
@@ -31,7 +40,7 @@ UNIT_TOLERANCE = 1e-6
 def misplaced_body(m, q):
     """Return the first body with an entry that is not finite, or a quaternion or pair not of length
     one; −1: none."""
-    for b in range(m.kind.shape[0]):
+    for b in range(len(m.kind)):
         first = m.q_start[b]
         stop = first + own_count(m, b)
         if not is_vector(m.kind[b]):
@@ -51,7 +60,7 @@ def misplaced_body(m, q):
 def mass_matrices_at(m, w, q, out):
     """out (n, d, d) <- M at each of n configurations q (n, nq); return False at the first that is
     not valid."""
-    for k in range(q.shape[0]):
+    for k in range(len(q)):
         if misplaced_body(m, q[k]) >= 0:
             return False
         forward_kinematics(m, q[k], w)
@@ -63,7 +72,7 @@ def mass_matrices_at(m, w, q, out):
 def biases_at(m, w, q, v, out):
     """out (n, d) <- B at each of n states, q (n, nq) and v (n, d); return False at the first that
     is not valid."""
-    for k in range(q.shape[0]):
+    for k in range(len(q)):
         if misplaced_body(m, q[k]) >= 0 or not all_finite(v[k]):
             return False
         forward_kinematics(m, q[k], w)
@@ -75,7 +84,7 @@ def biases_at(m, w, q, v, out):
 def rows_along(m, w, q, body, point, direction, out):
     """out (n, d) <- Jacobian rows of n world points, each fixed to a body (-1: the world), along
     directions."""
-    for i in range(q.shape[0]):
+    for i in range(len(q)):
         forward_kinematics(m, q[i], w)
         out[i] = 0.0
         add_point_force(m, w, body[i], point[i], direction[i], out[i])
@@ -99,16 +108,16 @@ def energies_along(m, w, q, v, g, kinetic, potential):
     Kinetic: the sum of (m |v_c|^2 + omega . I omega) / 2; potential: that of -m g . c over the
     bodies that can move.
     """
-    for k in range(q.shape[0]):
+    for k in range(len(q)):
         forward_kinematics(m, q[k], w)
         body_velocities(m, w, v[k])
         kinetic[k] = potential[k] = 0.0
-        for b in range(m.kind.shape[0]):
+        for b in range(len(m.kind)):
             u = center_velocity(w, b)
             omega = load(w.angular_velocity, b)
             kinetic[k] += 0.5 * (m.mass[b] * dot(u, u) + dot(omega, turned_inertia(m, w, b, omega)))
             if m.last_dof[b] >= 0:
-                potential[k] -= m.mass[b] * dot((g[0], g[1], g[2]), load(w.center, b))
+                potential[k] -= m.mass[b] * dot(three(g, 0), load(w.center, b))
 
 
 @kernel
@@ -117,21 +126,19 @@ def centroidal_momentum(m, w, v, out):
     centre of mass."""
     body_velocities(m, w, v)
     mass = 0.0
-    first_moment = (0.0, 0.0, 0.0)
-    linear = (0.0, 0.0, 0.0)
-    angular = (0.0, 0.0, 0.0)
-    for b in range(m.kind.shape[0]):
+    first_moment = linear = angular = ZERO
+    for b in range(len(m.kind)):
         if m.last_dof[b] >= 0:
             mass += m.mass[b]
             first_moment = add(first_moment, scale(m.mass[b], load(w.center, b)))
     common = scale(1.0 / mass if mass > 0.0 else 0.0, first_moment)
-    for b in range(m.kind.shape[0]):
+    for b in range(len(m.kind)):
         momentum = scale(m.mass[b], center_velocity(w, b))
         spin = turned_inertia(m, w, b, load(w.angular_velocity, b))
         linear = add(linear, momentum)
         angular = add(angular, add(spin, cross(subtract(load(w.center, b), common), momentum)))
-    out[0], out[1], out[2] = linear
-    out[3], out[4], out[5] = angular
+    put(out, 0, linear)
+    put(out, 3, angular)
 
 
 @kernel
@@ -141,7 +148,7 @@ def impact_loss(mass_matrix, lower, v, impulse, change):
     cholesky(mass_matrix, lower)
     solve_mass(lower, impulse, change)
     total = 0.0
-    for k in range(v.shape[0]):
+    for k in range(len(v)):
         total -= impulse[k] * (v[k] + 0.5 * change[k])
     return total
 
@@ -150,15 +157,16 @@ def impact_loss(mass_matrix, lower, v, impulse, change):
 def poses_along(m, w, q, out):
     """out (n, bodies, 3 or 7) <- the pose of every body at each row of q (n, nq), see
     `Mechanism.poses`."""
-    for k in range(q.shape[0]):
+    for k in range(len(q)):
         forward_kinematics(m, q[k], w)
         for b in range(out.shape[1]):
-            out[k, b, 0] = w.position[b, 0]
-            out[k, b, 1] = w.position[b, 1]
+            x, y, z = load(w.position, b)
+            out[k, b, 0] = x
+            out[k, b, 1] = y
             if out.shape[2] == 3:
                 out[k, b, 2] = arc_tangent(w.rotation[b, 1, 0], w.rotation[b, 0, 0])
             else:
-                out[k, b, 2] = w.position[b, 2]
+                out[k, b, 2] = z
                 write_quaternion(w.rotation[b], out[k, b, 3:])
 
 
@@ -193,17 +201,14 @@ def displacements_along(m, q, straight, out):
     start of the step, minus phi x c: the work of a force that keeps its direction in the world,
     where `difference` gives a screw motion.
     """
-    for k in range(out.shape[0]):
+    for k in range(len(out)):
         difference(m, q[k], q[k + 1], out[k])
-        for b in range(m.kind.shape[0]):
+        for b in range(len(m.kind)):
             if straight and m.kind[b] == FREE_FLYER:
                 i = m.q_start[b]
                 j = m.v_start[b]
                 c = load(m.center_of_mass, b)
-                now = q[k, i : i + 7]
-                then = q[k + 1, i : i + 7]
-                path = (then[0] - now[0], then[1] - now[1], then[2] - now[2])
-                path = add(path, turn_vector(then[3], then[4], then[5], then[6], c))
-                path = subtract(turn_vector(-now[3], -now[4], -now[5], now[6], path), c)
-                path = subtract(path, cross((out[k, j + 3], out[k, j + 4], out[k, j + 5]), c))
-                out[k, j], out[k, j + 1], out[k, j + 2] = path
+                path = subtract(three(q[k + 1], i), three(q[k], i))
+                path = add(path, turn_vector(q[k + 1], i + 3, c))
+                path = subtract(turn_vector_back(q[k], i + 3, path), c)
+                put(out[k], j, subtract(path, cross(three(out[k], j + 3), c)))

@@ -20,27 +20,35 @@ LINKAGE   velocity Verlet: q moves with v + Δt a/2, and v changes by the mean o
 from __future__ import annotations
 
 from math import ceil, sqrt
-from typing import NamedTuple
-
-import numpy as np
+from typing import Annotated, NamedTuple
 
 from iapb.mechanics.joints import FREE_FLYER, PLANAR, SPHERICAL
-from iapb.mechanics.kernels.configuration import integrate_body, turn_quaternion, turn_vector
+from iapb.mechanics.kernels.configuration import (
+    integrate_body,
+    turn_quaternion,
+    turn_vector,
+    turn_vector_back,
+)
 from iapb.numerics.compiled import kernel
 from iapb.numerics.elementary import sine_cosine
 from iapb.numerics.linalg import (
+    ZERO,
     accumulate,
     add,
     cross,
     dot,
     load,
+    multiply_by,
     norm,
+    put,
     scale,
     solve_mass,
     subtract,
+    three,
     transform,
     transform_back,
 )
+from iapb.numerics.schema import Floats, NumberPerTree
 
 STRAIGHT, RIGID, LINKAGE = range(3)
 # rad in a step: below the first, one turn of second order is exact to rounding; beyond the others,
@@ -57,15 +65,15 @@ STRETCH = 1.1
 class FreeMotion(NamedTuple):
     """What free motion needs to know of each of t trees (constant)."""
 
-    kind: np.ndarray  # (t,) int64 STRAIGHT, RIGID or LINKAGE
-    root: np.ndarray  # (t,) int64 first body that moves, −1 = none
-    base: np.ndarray  # (t,) int64 number of root velocities with a conserved momentum
-    # (t, 3) centre of mass of a RIGID tree [m]; zero if it turns about its origin
-    center: np.ndarray
-    axes: np.ndarray  # (t, 3, 3) its principal axes as rows, both in the root's axes
-    moments: np.ndarray  # (t, 3) its principal moments [kg m²] about centre or origin, ascending
-    turning: bool  # whether any tree is RIGID or a LINKAGE
-    linked: bool  # whether any tree is a LINKAGE
+    kind: NumberPerTree  # STRAIGHT, RIGID or LINKAGE
+    root: NumberPerTree  # first body that moves, −1 = none
+    base: NumberPerTree  # number of root velocities with a conserved momentum
+    # centre of mass of a RIGID tree [m]; zero if it turns about its origin
+    center: Annotated[Floats, "tree 3"]
+    axes: Annotated[Floats, "tree 3 3"]  # its principal axes as rows, both in the root's axes
+    moments: Annotated[Floats, "tree 3"]  # [kg m²] about centre or origin, ascending
+    turning: bool = False  # whether any tree is RIGID or a LINKAGE
+    linked: bool = False  # whether any tree is a LINKAGE
 
 
 @kernel
@@ -73,14 +81,13 @@ def turn_freely(free, t, q, i, v, k, dt):
     """Turn the quaternion at q[i] and the spin at v[k] of the RIGID tree t for dt [s]; R l stays as
     it is."""
     axes = free.axes
-    I = (free.moments[t, 0], free.moments[t, 1], free.moments[t, 2])
-    omega = transform(axes, t, (v[k], v[k + 1], v[k + 2]))
+    I = load(free.moments, t)
+    omega = transform(axes, t, three(v, k))
     l0 = I[0] * omega[0]
     l1 = I[1] * omega[1]
     l2 = I[2] * omega[2]
-    turn_quaternion(
-        q, i, transform_back(axes, t, (dt * l0 / I[1], dt * l1 / I[1], dt * l2 / I[1])), q
-    )
+    turned = (dt * l0 / I[1], dt * l1 / I[1], dt * l2 / I[1])
+    turn_quaternion(q, i, transform_back(axes, t, turned), q)
     first = 1.0 / I[0] - 1.0 / I[1]
     third = 1.0 / I[2] - 1.0 / I[1]
     if first != 0.0 or third != 0.0:
@@ -97,7 +104,7 @@ def turn_freely(free, t, q, i, v, k, dt):
                     angle = h * third * l2
                     turn_quaternion(q, i, scale(angle, load(axes[t], 2)), q)
                     l0, l1 = turned_back(angle, l0, l1)
-    v[k], v[k + 1], v[k + 2] = transform_back(axes, t, (l0 / I[0], l1 / I[1], l2 / I[2]))
+    put(v, k, transform_back(axes, t, (l0 / I[0], l1 / I[1], l2 / I[2])))
 
 
 @kernel
@@ -114,34 +121,25 @@ def fly(m, free, t, q, v, dt):
     i = m.q_start[b]
     k = m.v_start[b]
     c = load(free.center, t)
-    omega = (v[k + 3], v[k + 4], v[k + 5])
-    u = add((v[k], v[k + 1], v[k + 2]), cross(omega, c))
-    x = q[i + 3]
-    y = q[i + 4]
-    z = q[i + 5]
-    s = q[i + 6]
-    path = scale(dt, turn_vector(x, y, z, s, u))
+    omega = three(v, k + 3)
+    velocity = turn_vector(q, i + 3, add(three(v, k), cross(omega, c)))
+    path = scale(dt, velocity)
     if dot(omega, omega) > 0.0:
-        center = turn_vector(x, y, z, s, c)
-        velocity = turn_vector(x, y, z, s, u)
+        center = turn_vector(q, i + 3, c)
         turn_freely(free, t, q, i + 3, v, k + 3, dt)
-        x = q[i + 3]
-        y = q[i + 4]
-        z = q[i + 5]
-        s = q[i + 6]
-        path = add(path, subtract(center, turn_vector(x, y, z, s, c)))
-        u = turn_vector(-x, -y, -z, s, velocity)
-        v[k], v[k + 1], v[k + 2] = subtract(u, cross((v[k + 3], v[k + 4], v[k + 5]), c))
-    q[i], q[i + 1], q[i + 2] = q[i] + path[0], q[i + 1] + path[1], q[i + 2] + path[2]
+        path = add(path, subtract(center, turn_vector(q, i + 3, c)))
+        u = turn_vector_back(q, i + 3, velocity)
+        put(v, k, subtract(u, cross(three(v, k + 3), c)))
+    put(q, i, add(three(q, i), path))
 
 
 @kernel
 def move_simple_trees(m, free, tree_of_body, q, v, dt):
     """Move all trees but linkages for dt [s]."""
-    for b in range(m.kind.shape[0]):
+    for b in range(len(m.kind)):
         if free.kind[tree_of_body[b]] == STRAIGHT:
             integrate_body(m, b, q, v, dt, q)
-    for t in range(free.kind.shape[0]):
+    for t in range(len(free.kind)):
         if free.kind[t] == RIGID:
             b = free.root[t]
             if m.kind[b] == FREE_FLYER:
@@ -155,12 +153,12 @@ def parts_of_linkages(m, free, start, stop, v, dt):
     """Return the number of equal parts in which linkages move over the step, by their fastest
     rotating joint."""
     fastest = 0.0
-    for t in range(free.kind.shape[0]):
+    for t in range(len(free.kind)):
         if free.kind[t] == LINKAGE:
             for k in range(start[t], stop[t]):
                 if m.dof_rotates[k]:
                     fastest = max(fastest, abs(v[k]))
-    for k in range(v.shape[0], m.dof_body.shape[0]):
+    for k in range(len(v), len(m.dof_body)):
         if m.dof_rotates[k]:
             fastest = max(fastest, abs(m.dof_ratio[k] * v[m.dof_leader[k]]))
     return max(1, min(MOST_PARTS, ceil(dt * fastest / LINKAGE_ANGLE)))
@@ -193,14 +191,12 @@ def to_fixed_axes(m, free, w, q, t, p, way):
         i = m.q_start[b]
         p[2] += way * (q[i] * p[1] - q[i + 1] * p[0])
     elif m.kind[b] == SPHERICAL:
-        l = (p[0], p[1], p[2])
-        p[0], p[1], p[2] = (
-            transform(w.rotation, b, l) if way > 0.0 else transform_back(w.rotation, b, l)
-        )
+        l = three(p, 0)
+        put(p, 0, transform(w.rotation, b, l) if way > 0.0 else transform_back(w.rotation, b, l))
     else:
         place = load(w.position, b)
-        linear = (p[0], p[1], p[2])
-        angular = (p[3], p[4], p[5])
+        linear = three(p, 0)
+        angular = three(p, 3)
         if way > 0.0:
             linear = transform(w.rotation, b, linear)
             angular = transform(w.rotation, b, angular)
@@ -208,8 +204,8 @@ def to_fixed_axes(m, free, w, q, t, p, way):
         else:
             angular = transform_back(w.rotation, b, subtract(angular, cross(place, linear)))
             linear = transform_back(w.rotation, b, linear)
-        p[0], p[1], p[2] = linear
-        p[3], p[4], p[5] = angular
+        put(p, 0, linear)
+        put(p, 3, angular)
 
 
 @kernel
@@ -217,19 +213,19 @@ def linear_momentum(m, free, w, t, p):
     """Return the linear momentum [N s], in world axes, of a root's momentum in fixed axes; zero if
     it cannot move."""
     if free.base[t] == 0 or m.kind[free.root[t]] == SPHERICAL:
-        return (0.0, 0.0, 0.0)
+        return ZERO
     if m.kind[free.root[t]] == PLANAR:
         k = m.v_start[free.root[t]]
         return add(scale(p[0], load(w.axis, k)), scale(p[1], load(w.axis, k + 1)))
-    return (p[0], p[1], p[2])
+    return three(p, 0)
 
 
 @kernel
 def center_of(m, w, tree_of_body, t):
     """Return the centre of mass of tree t [m] and its mass [kg]."""
     mass = 0.0
-    moment = (0.0, 0.0, 0.0)
-    for b in range(m.kind.shape[0]):
+    moment = ZERO
+    for b in range(len(m.kind)):
         if tree_of_body[b] == t:
             mass += m.mass[b]
             moment = add(moment, scale(m.mass[b], load(w.center, b)))
@@ -246,13 +242,11 @@ def shift_root(m, free, w, tree_of_body, q, t, shift):
         k = m.v_start[root]
         local = (dot(load(w.axis, k), shift), dot(load(w.axis, k + 1), shift), 0.0)
     else:
-        local = turn_vector(
-            q[i + 3], q[i + 4], q[i + 5], q[i + 6], transform_back(w.rotation, root, shift)
-        )
+        local = turn_vector(q, i + 3, transform_back(w.rotation, root, shift))
     q[i], q[i + 1] = q[i] + local[0], q[i + 1] + local[1]
     if m.kind[root] != PLANAR:
         q[i + 2] += local[2]
-    for b in range(m.kind.shape[0]):
+    for b in range(len(m.kind)):
         if tree_of_body[b] == t:
             accumulate(w.position, b, shift)
             accumulate(w.center, b, shift)
@@ -279,8 +273,7 @@ def keep_momentum_and_energy(mass, lower, start, stop, base, p, energy, v, scrat
     if not own > 1e-12 * (carried + abs(energy)):
         return
     factor = min(STRETCH, sqrt(max(0.0, energy - carried) / own))
-    for k in range(start + base, stop):
-        v[k] *= factor
+    multiply_by(v[start + base : stop], factor)
     solve_root(mass, block, start, stop, base, p, v)
 
 

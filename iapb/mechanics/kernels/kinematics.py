@@ -5,14 +5,18 @@ from iapb.numerics.compiled import kernel
 from iapb.numerics.elementary import sine_cosine
 from iapb.numerics.linalg import (
     accumulate,
+    add,
     column,
     cross,
+    dot,
     load,
     placed,
+    put,
     scale,
     store,
     store_columns,
     subtract,
+    three,
     transform,
     turn_frame,
 )
@@ -68,11 +72,9 @@ def move_joint(m, q, w, b):
         turn_about_axis(w, b, a, c, s)
     elif kind != FIXED:  # a unit quaternion, after the position of a free flyer
         if kind == FREE_FLYER:
-            store(w.position, b, placed(w, b, (q[i], q[i + 1], q[i + 2])))
+            store(w.position, b, placed(w, b, three(q, i)))
             i += 3
-        x = q[i]
-        y = q[i + 1]
-        z = q[i + 2]
+        x, y, z = three(q, i)
         s = q[i + 3]
         turn_frame(
             w.rotation,
@@ -93,7 +95,7 @@ def forward_kinematics(m, q, w):
     Quaternions and (cos, sin) pairs must have length one; kernels do not check. A joint frame has
     R = R_parent R_placement, p = p_parent + R_parent p_placement.
     """
-    n = q.shape[0]
+    n = len(q)
     same = 0
     while same < n and q[same] == w.placed_q[same]:
         same += 1
@@ -103,7 +105,7 @@ def forward_kinematics(m, q, w):
         w.placed_q[k] = q[k]
     R = w.rotation
     fixed = m.placement_rotation
-    for b in range(m.kind.shape[0]):
+    for b in range(len(m.kind)):
         parent = m.parent[b]
         offset = load(m.placement_position, b)
         x = column(fixed, b, 0)
@@ -142,11 +144,9 @@ def frame_jacobian(m, w, body, point, out):
     k = m.last_dof[body]
     while k >= 0:
         column = out[:, m.dof_leader[k]]
-        x, y, z = motion_at(m, w, k, (point[0], point[1], point[2]))
-        column[0], column[1], column[2] = column[0] + x, column[1] + y, column[2] + z
+        put(column, 0, add(three(column, 0), motion_at(m, w, k, three(point, 0))))
         if m.dof_rotates[k]:
-            x, y, z = scale(m.dof_ratio[k], load(w.axis, k))
-            column[3], column[4], column[5] = column[3] + x, column[4] + y, column[5] + z
+            put(column, 3, add(three(column, 3), scale(m.dof_ratio[k], load(w.axis, k))))
         k = m.dof_parent[k]
 
 
@@ -162,6 +162,5 @@ def add_point_force(m, w, body, point, force, out):
     place = (point[0], point[1], point[2])
     k = m.last_dof[body]
     while k >= 0:
-        x, y, z = motion_at(m, w, k, place)
-        out[m.dof_leader[k]] += x * force[0] + y * force[1] + z * force[2]
+        out[m.dof_leader[k]] += dot(motion_at(m, w, k, place), force)
         k = m.dof_parent[k]
