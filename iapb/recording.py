@@ -122,11 +122,11 @@ class Recorder:
         number = list(LINES).index(lines)
         found = {}
         for each in LINES[lines]:
-            first = [self.start[each.name][None]] if each in STATES else []
-            blocks = [getattr(getattr(record, lines), each.name) for record in self.records]
-            used = [record.used[number] for record in self.records]
-            kept = [block[:count] for block, count in zip(blocks, used, strict=True)]
-            found[each.name] = np.concatenate(first + kept)
+            kept = [self.start[each.name][None]] if each in STATES else []
+            for record in self.records:
+                lines_of_record = getattr(record, lines)
+                kept.append(getattr(lines_of_record, each.name)[: record.used[number]])
+            found[each.name] = np.concatenate(kept)
         return found
 
     def _held(self, world: str, stopped: str) -> Run:

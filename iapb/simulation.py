@@ -25,7 +25,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from iapb.contact.laws import ContactLaw, ImpulseAugmented, Penalty, StepResult, copied_step
+from iapb.contact.laws import (
+    STEP_VECTORS,
+    ContactLaw,
+    ImpulseAugmented,
+    Penalty,
+    StepResult,
+    copied_step,
+)
 from iapb.effects import decide
 from iapb.engines import Engine, is_engine
 from iapb.errors import ArgumentError, IapbError
@@ -50,11 +57,9 @@ from iapb.numerics.schema import Floats
 from iapb.recording import Recorder
 from iapb.run import COLLIDING, FREE, INTERRUPTED, RESTING, Run
 from iapb.scene import Scene, find_scene, load_scene
-from iapb.scene.mechanism import wrench_of
+from iapb.scene.mechanism import wrench, wrench_of
 from iapb.system import System, system_of
 from iapb.worlds import find_world
-
-_STEP_VECTORS = ("q", "v", "penalty_force", "friction_force", "impulse")
 
 
 class Simulation:
@@ -210,12 +215,10 @@ class Simulation:
                 "hand_force", hand_force, f"None: scene {self.scene.name} has no hand"
             )
         force = real_numbers(hand_force)
-        good = force is not None and force.shape in ((3,), (6,)) and np.isfinite(force).all()
-        if force is None or not good:
+        if force is None or force.shape not in ((3,), (6,)) or not np.isfinite(force).all():
             raise ArgumentError("hand_force", hand_force, "3 (plane) or 6 (space) finite numbers")
         self._planned = False
-        self.port.wrench[:] = 0.0
-        self.port.wrench[[0, 1, 5] if force.shape == (3,) else slice(None)] = force
+        self.port.wrench[:] = wrench(force)
 
     def _take(self) -> None:
         """Do the step of a law written in Python, and copy its result into the state that the device
@@ -238,7 +241,7 @@ class Simulation:
                 expected = f"a count from 0 to {most}, the size of its buffer"
                 raise ArgumentError(f"{law} {what}", given, expected)
         checked = {}
-        for name in _STEP_VECTORS:
+        for name in STEP_VECTORS:
             shape = getattr(state, name).shape
             checked[name] = finite_array(f"{law} {name}", getattr(result, name), shape)
         for name, vector in checked.items():

@@ -13,11 +13,12 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, NamedTuple, Protocol, Self
 
 from iapb.contact.kernels.motion import STATUS_TEXT
+from iapb.contact.kernels.step import contact_state
 from iapb.contact.kernels.world import State
 from iapb.errors import ArgumentError, IapbError
 from iapb.names import one_of
+from iapb.numerics.compiled import Entry
 from iapb.numerics.schema import Floats
-from iapb.run import COLLIDING, FREE, RESTING
 
 INTEGRATORS = ("momentum", "semi_implicit_euler")  # of a scene: see `iapb.contact.kernels.motion`
 RENDERINGS = ("full", "saturate", "scale", "spread")
@@ -50,22 +51,14 @@ class StepResult(NamedTuple):
     state: int  # FREE, COLLIDING or RESTING: the tool's contact state (see iapb.run)
 
 
+STEP_VECTORS = StepResult._fields[:-1]
+_contact_state = Entry(contact_state)
+
+
 def copied_step(system: Any, state: State) -> StepResult:
     """Return copies of the results of the step that `state` has just made."""
-    states = state.state_of_tree
-    tool = system.tool_tree
-    # As the kernel `contact_state` does, without numba's look-up of types.
-    told = next((each for each in (COLLIDING, RESTING) if each in states), FREE)
-    if tool >= 0:
-        told = states[tool]
-    return StepResult(
-        state.q.copy(),
-        state.v.copy(),
-        state.penalty_force.copy(),
-        state.friction_force.copy(),
-        state.impulse.copy(),
-        int(told),
-    )
+    vectors = [getattr(state, name).copy() for name in STEP_VECTORS]
+    return StepResult._make([*vectors, int(_contact_state(state, system.tool_tree))])
 
 
 class ContactLaw(Protocol):

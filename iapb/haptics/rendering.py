@@ -123,7 +123,7 @@ def sense(world, port, velocity):
     first = port.clock[0] == 0
     m = port.mechanism
     difference(m, port.sensed_q, port.device_q, port.error)
-    for b in range(len(m.kind)):
+    for b in range(m.bodies):
         i = m.q_start[b]
         k = m.v_start[b]
         vector = is_vector(m.kind[b])
@@ -211,9 +211,14 @@ def render(world, state, port):
     for k in range(len(port.environment_force)):
         contact = state.penalty_force[k] + state.friction_force[k]
         port.environment_force[k] = contact + state.impulse[k] / world.dt
-    if port.coupling == NO_COUPLING:
-        return
-    # F_env (four-channel only) minus the PD, clipped to the device's limits and delayed
+    if port.coupling != NO_COUPLING:
+        command(port)
+
+
+@kernel
+def command(port):
+    """Write the actuator force: F_env (four-channel only) minus the PD, clipped to the device's
+    limits and delayed."""
     slots = len(port.delayed_force)
     now = port.clock[0] % slots
     for i in range(len(port.device_force)):

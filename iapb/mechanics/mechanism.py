@@ -134,7 +134,7 @@ class Mechanism:
         self.tree_dofs = _ranges(self.tree_of_dof, count)
         parts = structure.moving_parts(self.arrays)
         self._parts: Any = block(parts)
-        self.motions = len(self.arrays.dof_body)
+        self.motions = self.arrays.motions
         self._scratch = _Scratch(len(self.bodies), len(parts.kind), self.motions)
         self._alone: dict[int, Mechanism] = {}
         self.has_constant_mass_matrix: bool = structure.has_constant_mass_matrix(parts)
@@ -194,7 +194,7 @@ class Mechanism:
         With `planar` the result is (n, bodies, 3): x, y [m] and the angle in (−π, π] [rad].
         Otherwise it is (n, bodies, 7): x, y, z [m] and the quaternion x, y, z, w with w >= 0.
         """
-        places = float_array("qs", qs, (-1, self.nq))
+        places = self._places(qs)
         shape = len(places), len(self.bodies), 3 if planar else 7
         return self._filled(shape, _KERNELS.poses_along, self._scratch.workspace, places)
 
@@ -204,7 +204,7 @@ class Mechanism:
 
     def mass_matrices(self, qs: ArrayLike) -> Floats:
         """Return M (n, d, d) at each of the n configurations qs (n, nq), in one compiled call."""
-        places = float_array("qs", qs, (-1, self.nq))
+        places = self._places(qs)
         out = np.empty((len(places), self.nv, self.nv))
         if not _KERNELS.mass_matrices_at(self._parts, self._scratch.parts, places, out):
             self._check_states(places)
@@ -282,7 +282,7 @@ class Mechanism:
 
         Body -1 is the world, which does not move.
         """
-        places = float_array("qs", qs, (-1, self.nq))
+        places = self._places(qs)
         fixed_to = np.ascontiguousarray(bodies, np.int64)
         spots = float_array("points", points, (-1, 3))
         along = float_array("directions", directions, (-1, 3))
@@ -322,7 +322,7 @@ class Mechanism:
         A free body turns about a screw axis in a step, or, with `straight`, its centre of mass
         moves straight, as the integrator `momentum` moves it.
         """
-        places = float_array("qs", qs, (-1, self.nq))
+        places = self._places(qs)
         shape = max(len(places) - 1, 0), self.nv
         return self._filled(shape, _KERNELS.displacements_along, places, bool(straight))
 
@@ -362,9 +362,12 @@ class Mechanism:
             )
         return place
 
+    def _places(self, qs: ArrayLike) -> Floats:
+        return float_array("qs", qs, (-1, self.nq))
+
     def _states(self, qs: ArrayLike, vs: ArrayLike) -> tuple[Floats, Floats]:
         """Return as many configurations (n, nq) as velocities (n, d), or raise ArgumentError."""
-        places = float_array("qs", qs, (-1, self.nq))
+        places = self._places(qs)
         rates = float_array("vs", vs, (-1, self.nv))
         if len(places) != len(rates):
             raise ArgumentError("vs of shape", rates.shape, f"as many rows as qs, {len(places)}")

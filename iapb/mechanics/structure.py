@@ -56,6 +56,8 @@ def collect_arrays(bodies: tuple[Body, ...], parents: list[int]) -> MechanismArr
         dof_ratio[k] = mimic.multiplier
         dof_offset[k] = mimic.offset
     return MechanismArrays(
+        bodies=count,
+        motions=motions,
         kind=np.array([layout.code for layout in layouts], np.int64),
         parent=np.array(parents, np.int64),
         q_start=q_start,
@@ -118,9 +120,10 @@ def moving_parts(m: MechanismArrays) -> MechanismArrays:
         own.append((np.eye(3), np.zeros(3)) if moves[b] else placed[b])
     moving = np.flatnonzero(moves)
     new_index = np.append(np.cumsum(moves) - 1, -1)  # the last one is that of the world, -1
-    of_joints = ("dof_", "quaternions")
+    of_joints = ("bodies", "motions", "dof_", "quaternions")
     kept = {k: rows[moving] for k, rows in m._asdict().items() if not k.startswith(of_joints)}
     parts = m._replace(**kept)._replace(
+        bodies=len(moving),
         parent=new_index[np.append(carrier, -1)[m.parent[moving]]],
         dof_body=new_index[m.dof_body],
     )

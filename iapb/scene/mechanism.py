@@ -142,21 +142,25 @@ def require_joints(scene: Scene) -> None:
 def wrench_of(scene: Scene, time: float) -> Floats:
     """Return force and torque (6,) of the scene's hand at a time [s] in world axes; zeros without a
     hand."""
-    wrench = np.zeros(6)
-    force = scene.hand.force_at(time) if scene.hand is not None else [0.0] * 6
-    wrench[[0, 1, 5] if len(force) == 3 else slice(None)] = force
-    return wrench
+    return wrench(scene.hand.force_at(time) if scene.hand is not None else [0.0] * 6)
+
+
+def wrench(force: Any) -> Floats:
+    """Return force and torque (6,) given by three numbers in the plane, or by six in space."""
+    found = np.zeros(6)
+    found[[0, 1, 5] if len(force) == 3 else slice(None)] = force
+    return found
 
 
 def hand_force_of(scene: Scene, mechanism: Mechanism, q: Floats, time: float) -> Floats:
     """Return the generalized force (d,) of the scene's hand at a configuration and a time [s]."""
-    wrench = wrench_of(scene, time)
-    if scene.hand is None or not wrench.any():
+    pull = wrench_of(scene, time)
+    if scene.hand is None or not pull.any():
         return np.zeros(mechanism.nv)
     body = mechanism.index(scene.hand.body)
     lever = product(mechanism.placements(q)[0][body], in_space(scene.hand.point))
-    wrench[3:] += np.cross(lever, wrench[:3])
-    return product(mechanism.frame_jacobian(q, body).T, wrench)
+    pull[3:] += np.cross(lever, pull[:3])
+    return product(mechanism.frame_jacobian(q, body).T, pull)
 
 
 def gravity_of(scene: Scene) -> Floats:

@@ -163,7 +163,7 @@ def swing(world, state, h):
     for t in range(len(free.kind)):
         if free.kind[t] == LINKAGE:
             note_momentum(world, state, t, h)
-    for b in range(len(m.kind)):
+    for b in range(m.bodies):
         if free.kind[world.tree_of_body[b]] == LINKAGE:
             start = m.v_start[b]
             stop = start + m.v_count[b]

@@ -17,6 +17,8 @@ class MechanismArrays(NamedTuple):
     with rate and position `dof_ratio` times the leader's, plus `dof_offset`.
     """
 
+    bodies: int  # n
+    motions: int  # m
     kind: Integers  # (n,) joint code
     parent: Integers  # (n,) body that carries this one, -1 = the world
     q_start: Integers  # (n,) first entry of the joint in q

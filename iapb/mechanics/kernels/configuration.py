@@ -121,7 +121,7 @@ def integrate_body(m, b, q, v, dt, out):
 @kernel
 def integrate(m, q, v, dt, out):
     """out (nq,) <- q moved for dt with the constant velocity v; out may be q itself."""
-    for b in range(len(m.kind)):
+    for b in range(m.bodies):
         integrate_body(m, b, q, v, dt, out)
 
 
@@ -168,7 +168,7 @@ def difference_in_space(m, b, q0, q1, out):
 @kernel
 def difference(m, q0, q1, out):
     """out (d,) <- the v with integrate(q0, v, 1) = q1, by the shortest rotations."""
-    for b in range(len(m.kind)):
+    for b in range(m.bodies):
         kind = m.kind[b]
         i = m.q_start[b]
         k = m.v_start[b]

@@ -36,27 +36,16 @@ def composite_bodies(m, w):
 
     Two bodies together have the inertia I1 + I2 + mu (|r|^2 1 - r r^T), mu = m1 m2 / (m1 + m2).
     """
-    for b in range(len(m.kind)):
+    for b in range(m.bodies):
         w.composite_mass[b] = m.mass[b]
         store(w.composite_center, b, load(w.center, b))
         rotation = w.rotation[b]  # the inertia in world axes is R I R^T
-        x = load(rotation, 0)
-        y = load(rotation, 1)
-        z = load(rotation, 2)
-        image_x = transform(m.inertia, b, x)
-        image_y = transform(m.inertia, b, y)
-        image_z = transform(m.inertia, b, z)
-        xx = dot(x, image_x)
-        yy = dot(y, image_y)
-        zz = dot(z, image_z)
-        xy = dot(x, image_y)
-        xz = dot(x, image_z)
-        yz = dot(y, image_z)
         own = w.composite_inertia[b]
-        store(own, 0, (xx, xy, xz))
-        store(own, 1, (xy, yy, yz))
-        store(own, 2, (xz, yz, zz))
-    for b in range(len(m.kind) - 1, -1, -1):
+        for j in range(3):
+            image = transform(m.inertia, b, load(rotation, j))
+            for i in range(j + 1):
+                own[i, j] = own[j, i] = dot(load(rotation, i), image)
+    for b in range(m.bodies - 1, -1, -1):
         into = m.parent[b]
         if into >= 0:
             m1 = w.composite_mass[into]
@@ -89,8 +78,8 @@ def mass_matrix(m, w, out):
     """
     composite_bodies(m, w)
     out[:] = 0.0
-    alone = len(m.dof_body) == len(out)
-    for j in range(len(m.dof_body)):
+    alone = m.motions == len(out)
+    for j in range(m.motions):
         b = m.dof_body[j]
         a = load(w.axis, j)
         c = load(w.composite_center, b)
@@ -130,7 +119,7 @@ def add_to_leaders(m, i, j, entry, out):
 def gravity(m, w, g, out):
     """out (d,) <- G(q) = d(potential energy)/dq for the gravity field g (3,) [m/s^2], world
     axes."""
-    for b in range(len(m.kind)):
+    for b in range(m.bodies):
         store(w.force, b, scale(-m.mass[b], three(g, 0)))
         store(
             w.moment, b, cross(subtract(load(w.center, b), load(w.position, b)), load(w.force, b))
@@ -142,7 +131,7 @@ def gravity(m, w, g, out):
 def project_forces(m, w, out):
     """Sum forces and moments (about body origins) from the leaves inwards; out (d,) <- their dof
     components."""
-    for b in range(len(m.kind) - 1, -1, -1):
+    for b in range(m.bodies - 1, -1, -1):
         f = load(w.force, b)
         n = load(w.moment, b)
         for k in range(m.v_start[b], m.v_start[b] + m.v_count[b]):
@@ -153,7 +142,7 @@ def project_forces(m, w, out):
             lever = subtract(load(w.position, b), load(w.position, parent))
             accumulate(w.force, parent, f)
             accumulate(w.moment, parent, add(n, cross(lever, f)))
-    for k in range(len(out), len(m.dof_body)):
+    for k in range(len(out), m.motions):
         total = w.moment if m.dof_rotates[k] else w.force
         share = dot(load(w.axis, k), load(total, m.dof_body[k]))
         out[m.dof_leader[k]] += m.dof_ratio[k] * share
@@ -176,7 +165,7 @@ def relative_motion(m, w, b, rates):
 @kernel
 def body_velocities(m, w, v):
     """Write the angular velocity of each body and the velocity of its origin."""
-    for b in range(len(m.kind)):
+    for b in range(m.bodies):
         parent = m.parent[b]
         linear, angular = relative_motion(m, w, b, v)
         omega = load(w.angular_velocity, parent) if parent >= 0 else ZERO
@@ -197,7 +186,7 @@ def inverse_dynamics(m, w, v, dv, g, out):
     Then, with r = c - p and the inertia I in body axes, f = m (a + alpha x r + omega x (omega x r))
     and n = R (I R^T alpha + R^T omega x I R^T omega) + r x f about p.
     """
-    for b in range(len(m.kind)):
+    for b in range(m.bodies):
         parent = m.parent[b]
         u, s = relative_motion(m, w, b, v)
         omega = s

@@ -40,7 +40,7 @@ UNIT_TOLERANCE = 1e-6
 def misplaced_body(m, q):
     """Return the first body with an entry that is not finite, or a quaternion or pair not of length
     one; −1: none."""
-    for b in range(len(m.kind)):
+    for b in range(m.bodies):
         first = m.q_start[b]
         stop = first + own_count(m, b)
         if not is_vector(m.kind[b]):
@@ -112,7 +112,7 @@ def energies_along(m, w, q, v, g, kinetic, potential):
         forward_kinematics(m, q[k], w)
         body_velocities(m, w, v[k])
         kinetic[k] = potential[k] = 0.0
-        for b in range(len(m.kind)):
+        for b in range(m.bodies):
             u = center_velocity(w, b)
             omega = load(w.angular_velocity, b)
             kinetic[k] += 0.5 * (m.mass[b] * dot(u, u) + dot(omega, turned_inertia(m, w, b, omega)))
@@ -127,12 +127,12 @@ def centroidal_momentum(m, w, v, out):
     body_velocities(m, w, v)
     mass = 0.0
     first_moment = linear = angular = ZERO
-    for b in range(len(m.kind)):
+    for b in range(m.bodies):
         if m.last_dof[b] >= 0:
             mass += m.mass[b]
             first_moment = add(first_moment, scale(m.mass[b], load(w.center, b)))
     common = scale(1.0 / mass if mass > 0.0 else 0.0, first_moment)
-    for b in range(len(m.kind)):
+    for b in range(m.bodies):
         momentum = scale(m.mass[b], center_velocity(w, b))
         spin = turned_inertia(m, w, b, load(w.angular_velocity, b))
         linear = add(linear, momentum)
@@ -180,17 +180,24 @@ def write_quaternion(r, q):
     k = (i + 2) % 3
     if trace > r[i, i]:
         s = 2.0 * sqrt(1.0 + trace)
-        q[i] = (r[k, j] - r[j, k]) / s
-        q[j] = (r[i, k] - r[k, i]) / s
-        q[k] = (r[j, i] - r[i, j]) / s
+        for n in range(3):
+            q[n] = skew_part(r, n) / s
         q[3] = 0.25 * s
     else:
         s = 2.0 * sqrt(1.0 + r[i, i] - r[min(j, k), min(j, k)] - r[max(j, k), max(j, k)])
-        s = s if r[k, j] >= r[j, k] else -s
+        s = s if skew_part(r, i) >= 0.0 else -s
         q[i] = 0.25 * s
-        q[j] = (r[i, j] + r[j, i]) / s
-        q[k] = (r[i, k] + r[k, i]) / s
-        q[3] = (r[k, j] - r[j, k]) / s
+        for n in (j, k):
+            q[n] = (r[i, n] + r[n, i]) / s
+        q[3] = skew_part(r, i) / s
+
+
+@kernel
+def skew_part(r, i):
+    """Return component i of the vector of R − Rᵀ: twice the sine of the angle, along the axis."""
+    j = (i + 1) % 3
+    k = (i + 2) % 3
+    return r[k, j] - r[j, k]
 
 
 @kernel
@@ -203,7 +210,7 @@ def displacements_along(m, q, straight, out):
     """
     for k in range(len(out)):
         difference(m, q[k], q[k + 1], out[k])
-        for b in range(len(m.kind)):
+        for b in range(m.bodies):
             if straight and m.kind[b] == FREE_FLYER:
                 i = m.q_start[b]
                 j = m.v_start[b]

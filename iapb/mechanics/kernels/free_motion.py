@@ -136,7 +136,7 @@ def fly(m, free, t, q, v, dt):
 @kernel
 def move_simple_trees(m, free, tree_of_body, q, v, dt):
     """Move all trees but linkages for dt [s]."""
-    for b in range(len(m.kind)):
+    for b in range(m.bodies):
         if free.kind[tree_of_body[b]] == STRAIGHT:
             integrate_body(m, b, q, v, dt, q)
     for t in range(len(free.kind)):
@@ -158,7 +158,7 @@ def parts_of_linkages(m, free, start, stop, v, dt):
             for k in range(start[t], stop[t]):
                 if m.dof_rotates[k]:
                     fastest = max(fastest, abs(v[k]))
-    for k in range(len(v), len(m.dof_body)):
+    for k in range(len(v), m.motions):
         if m.dof_rotates[k]:
             fastest = max(fastest, abs(m.dof_ratio[k] * v[m.dof_leader[k]]))
     return max(1, min(MOST_PARTS, ceil(dt * fastest / LINKAGE_ANGLE)))
@@ -225,7 +225,7 @@ def center_of(m, w, tree_of_body, t):
     """Return the centre of mass of tree t [m] and its mass [kg]."""
     mass = 0.0
     moment = ZERO
-    for b in range(len(m.kind)):
+    for b in range(m.bodies):
         if tree_of_body[b] == t:
             mass += m.mass[b]
             moment = add(moment, scale(m.mass[b], load(w.center, b)))
@@ -246,7 +246,7 @@ def shift_root(m, free, w, tree_of_body, q, t, shift):
     q[i], q[i + 1] = q[i] + local[0], q[i + 1] + local[1]
     if m.kind[root] != PLANAR:
         q[i + 2] += local[2]
-    for b in range(len(m.kind)):
+    for b in range(m.bodies):
         if tree_of_body[b] == t:
             accumulate(w.position, b, shift)
             accumulate(w.center, b, shift)

@@ -105,7 +105,7 @@ def forward_kinematics(m, q, w):
         w.placed_q[k] = q[k]
     R = w.rotation
     fixed = m.placement_rotation
-    for b in range(len(m.kind)):
+    for b in range(m.bodies):
         parent = m.parent[b]
         offset = load(m.placement_position, b)
         x = column(fixed, b, 0)
