@@ -18,7 +18,7 @@ from iapb.numerics.schema import (
     Floats,
     IndexPerContact,
     Indices,
-    Integers,
+    NumberPerContact,
     States,
     VectorPerContact,
 )
@@ -77,7 +77,7 @@ class ContactBuffer(NamedTuple):
     shape_b: IndexPerContact
     body_a: IndexPerContact  # moving body that the normal points into
     body_b: IndexPerContact  # other body, -1 = the static world
-    feature: Annotated[Integers, "contact"]  # which vertex and edge touch; stable while they do
+    feature: NumberPerContact  # which vertex and edge touch; stable while they do
     # [m] world, midway between the two surfaces along the normal
     point: VectorPerContact
     normal: VectorPerContact  # unit, from b into a

@@ -24,6 +24,7 @@ from iapb.numerics.linalg import cholesky, dot, load, placed, solve_mass, three
 from iapb.numerics.schema import (
     Booleans,
     FloatPerTool,
+    FloatPerToolCoordinate,
     FloatPerVelocity,
     Floats,
     Integers,
@@ -61,7 +62,7 @@ class Port(NamedTuple):
     varying_inertia: bool
     free: FreeMotion  # of the device alone
     trees: Annotated[Integers, "tool_body"]  # zeros: the device is one tree
-    device_q: Annotated[Floats, "tool_coordinate"]
+    device_q: FloatPerToolCoordinate
     device_v: FloatPerTool
     device_mass: Annotated[Floats, "tool tool"]
     device_lower: Annotated[Floats, "tool tool"]
@@ -75,9 +76,9 @@ class Port(NamedTuple):
     delayed_force: Annotated[Floats, "slot tool"]
     delayed_q: Annotated[Floats, "slot tool_coordinate"]  # ring of measured positions on their way
     delayed_v: Annotated[Floats, "slot tool"]
-    sensed_q: Annotated[Floats, "tool_coordinate"]  # positions read by the sensors
+    sensed_q: FloatPerToolCoordinate  # positions read by the sensors
     # position of the device as the simulation reads it
-    measured_q: Annotated[Floats, "tool_coordinate"]
+    measured_q: FloatPerToolCoordinate
     measured_v: FloatPerTool
     hand_force: FloatPerVelocity  # of the hand on the tool
     device_hand_force: FloatPerTool  # of the hand on the device

@@ -20,6 +20,7 @@ from iapb.contact.kernels.shape_frames import (
     copy_found,
     copy_geometry,
     copy_past,
+    copy_slip,
 )
 from iapb.numerics.compiled import kernel
 from iapb.numerics.linalg import equal
@@ -39,6 +40,8 @@ def find_contacts(world, state):
     # `mark_new` and friction compare with those of the last step
     for i in range(state.contact_count[0]):
         copy_past(before, i, now, i)
+        if world.switches.implicit_contact and world.switches.friction:
+            copy_slip(before, i, now, i)
     state.contact_count[1] = state.contact_count[0]
     end = state.cut.end
     found = state.cut.arriving[0] >= 0 and equal(state.q, end.q) and equal(state.v, end.v)

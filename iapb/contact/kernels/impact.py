@@ -20,7 +20,13 @@ from iapb.numerics.linalg import (
     whiten_columns,
     write_difference,
 )
-from iapb.numerics.schema import Booleans, FloatPerRow, FloatPerVelocity, Floats, VelocityMatrix
+from iapb.numerics.schema import (
+    Booleans,
+    FloatPerRow,
+    FloatPerVelocity,
+    VelocityMatrix,
+    VelocityRows,
+)
 
 # Two rows that differ by less than this (rows of unit length in the kinetic metric) count as one.
 # The error of restitution is then at most (1 + e) · tolerance · |u|. A larger tolerance would
@@ -45,8 +51,8 @@ class ImpactWork(NamedTuple):
     v_plus: FloatPerVelocity
     momentum: FloatPerVelocity  # generalized impulse M(v⁺ − v⁻)
     # rows of J as columns, then of A, then their residuals
-    columns: Annotated[Floats, "velocity row"]
-    rows: Annotated[Floats, "velocity row"]  # unit rows of A as columns, kept for impulses
+    columns: VelocityRows
+    rows: VelocityRows  # unit rows of A as columns, kept for impulses
     length: FloatPerRow  # lengths of the rows of A
     basis: VelocityMatrix  # rows are the orthonormal basis Q
     triangle: VelocityMatrix  # T of the impulses of least norm

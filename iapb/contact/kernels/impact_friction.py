@@ -27,7 +27,7 @@ from iapb.contact.kernels.unilateral import push_only
 from iapb.numerics.compiled import copy_into, kernel
 from iapb.numerics.elementary import hypotenuse
 from iapb.numerics.linalg import add_multiple, dot_of, multiply_by, norm_of, orthogonalize
-from iapb.numerics.schema import FloatPerRow, FloatPerVelocity, Floats
+from iapb.numerics.schema import FloatPerRow, FloatPerTangent, FloatPerVelocity, Floats
 
 # share of a tangent's row: a smaller part outside the span of the normal rows is rounding
 GONE = 1e-13
@@ -39,12 +39,12 @@ class FrictionWork(NamedTuple):
 
     rows: Annotated[Floats, "tangent velocity"]  # tangents' rows of J, then of A, then B
     normal_part: Annotated[Floats, "tangent velocity"]  # A_t Qᵀ: the removed part, along the basis
-    speed: Annotated[Floats, "tangent"]  # tangential velocity after the normal impact [m/s]
-    p: Annotated[Floats, "tangent"]  # tangential impulses [N s]
+    speed: FloatPerTangent  # tangential velocity after the normal impact [m/s]
+    p: FloatPerTangent  # tangential impulses [N s]
     block: Annotated[Floats, "row 3"]  # the entries xx, xy, yy of B_i B_iᵀ [1/kg]
     inertia: FloatPerRow  # its largest eigenvalue
     # ∂p_n,i / ∂p_t,i by least norm: effect on its contact's p_n
-    response: Annotated[Floats, "tangent"]
+    response: FloatPerTangent
     coefficient: FloatPerRow  # μ
     limit: FloatPerRow  # Coulomb's limit μ p_n [N s]
     change: FloatPerRow  # change of each limit required by a round

@@ -57,9 +57,11 @@ from iapb.numerics.linalg import (
 )
 from iapb.numerics.schema import (
     FloatPerContact,
+    FloatPerRestRow,
     FloatPerVelocity,
     Floats,
     Integers,
+    NumberPerContact,
     NumberPerTree,
     NumberPerVelocity,
     SingleFloat,
@@ -95,20 +97,20 @@ class RestWork(NamedTuple):
     number those of the group. `width` is twice the number of coordinates of the largest tree.
     """
 
-    contact: Annotated[Integers, "contact"]  # contacts of the group
+    contact: NumberPerContact  # contacts of the group
     at: Annotated[Integers, "contact 2"]  # first local coordinate of each of their two trees
     # number of coordinates of these; 0 = no tree, or the first one again
     size: Annotated[Integers, "contact 2"]
     direction: Annotated[Floats, "rest_row 3"]  # of each row: the normal, then the tangents
     rows: Annotated[Floats, "rest_row width"]  # rows of J: one half for each of the two trees
-    speed: Annotated[Floats, "rest_row"]  # J v [m/s]
-    p: Annotated[Floats, "rest_row"]  # impulses of the step [N s]
+    speed: FloatPerRestRow  # J v [m/s]
+    p: FloatPerRestRow  # impulses of the step [N s]
     limit: FloatPerContact  # limits c = μ F_n Δt of friction [N s]
     # what a contact moved more than Δt J v in the step before, by Δt [m/s]
-    bend: Annotated[Floats, "rest_row"]
+    bend: FloatPerRestRow
     stiffness: SingleFloat  # K of the group's contacts [N/m]
     first: NumberPerTree  # first contact of each group, by its first tree, −1 = none
-    next: Annotated[Integers, "contact"]  # contact of the same group that follows, −1 = none
+    next: NumberPerContact  # contact of the same group that follows, −1 = none
     next_tree: NumberPerTree  # tree of the same group that follows, −1 = none
     offset: NumberPerTree  # first local coordinate of each tree
     dof: NumberPerVelocity  # the coordinate v[dof] of each local one
@@ -116,7 +118,7 @@ class RestWork(NamedTuple):
     end: NumberPerVelocity  # and the one after the last
     # first nonzero column of each row of the Newton matrix
     envelope: NumberPerVelocity
-    change: Annotated[Floats, "rest_row"]  # J Δv of a Newton step
+    change: FloatPerRestRow  # J Δv of a Newton step
     v: FloatPerVelocity  # local velocities
     free: FloatPerVelocity  # v*
     dry: FloatPerVelocity  # limits Δt F of joint friction [N s, N m s]
@@ -265,7 +267,7 @@ def gather_contacts(world, state, group, s):
     work = state.rest_work
     contacts = state.contacts
     count = begin = 0
-    i = state.rest_work.first[group]
+    i = work.first[group]
     while i >= 0:
         work.contact[count] = i
         work.limit[count] = 0.0
@@ -458,13 +460,13 @@ def set_impulses(world, state, count, s, k, share):
 def slope(world, state, size, count, s, k, share, linear, quadratic):
     """Write the impulses at `share` of the Newton step; return the derivative of the minimised
     function along it."""
+    work = state.rest_work
     total = linear + share * quadratic
     set_impulses(world, state, count, s, k, share)
     for j in range(count * s):
-        total -= state.rest_work.p[j] * state.rest_work.change[j]
+        total -= work.p[j] * work.change[j]
     for i in range(size if world.switches.joint_friction else 0):
-        speed = state.rest_work.v[i] + share * state.rest_work.step[i]
-        total += dry_impulse(state.rest_work, i, speed) * state.rest_work.step[i]
+        total += dry_impulse(work, i, work.v[i] + share * work.step[i]) * work.step[i]
     return total
 
 
@@ -650,13 +652,10 @@ def is_quadratic(world, state, size, count, s, k):
     work = state.rest_work
     for i in range(size if world.switches.joint_friction else 0):
         speed = work.v[i]
-        after = work.v[i] + work.step[i]
+        after = speed + work.step[i]
         slides = max(abs(speed), abs(after)) > STICKING
-        if (
-            work.dry[i] > 0.0
-            and slides
-            and not (min(abs(speed), abs(after)) > STICKING and speed * after > 0.0)
-        ):
+        slides_on = min(abs(speed), abs(after)) > STICKING and speed * after > 0.0
+        if work.dry[i] > 0.0 and slides and not slides_on:
             return False
     for r in range(count):
         j = r * s
@@ -757,7 +756,7 @@ def remember_points(world, state, r, s):
     """Write what `moved_aside` needs of contact r: both points, Δt J v and the angle of rolling."""
     work = state.rest_work
     contacts = state.contacts
-    i = state.rest_work.contact[r]
+    i = work.contact[r]
     x = load(contacts.point, i)
     n = load(contacts.normal, i)
     store(contacts.point_a, i, material_point(state, contacts.body_a[i], x))

@@ -54,9 +54,11 @@ def add_body_row(world, state, body, x, n, factor, out):
 
 @kernel
 def write_row(world, state, i, direction, of_a, of_b):
-    """Write `state.row` (d,): the velocity of body a at contact i along a unit direction times of_a,
-    plus that of body b times of_b. 1 and −1 along the normal: (11) and (12); 1 and 0, 0 and 1: (13)
-    and (14)."""
+    """Write `state.row` (d,): of_a times the velocity of body a at contact i along a unit direction,
+    plus of_b times that of body b.
+
+    Along the normal, 1 and −1 give (11) and (12); 1 and 0 give (13), 0 and 1 give (14).
+    """
     contacts = state.contacts
     x = load(contacts.point, i)
     state.row[:] = 0.0

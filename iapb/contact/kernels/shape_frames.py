@@ -163,11 +163,16 @@ def store_contact(shapes, one, other, one_is_a, feature, point, normal, gap, buf
     return count + 1
 
 
+# the fields of a contact, and where each group of them begins
 _FIELDS = quantities(ContactBuffer)
+_FOUND, _PAST, _SLIP, _REST = (
+    ContactBuffer._fields.index(name) for name in ("is_new", "normal_force", "point_a", "collides")
+)
 copy_contact = line_copier(_FIELDS)
-copy_geometry = line_copier(_FIELDS[:8])
-copy_found = line_copier(_FIELDS[:14])
-copy_past = line_copier(_FIELDS[:8] + _FIELDS[14:23])  # what the next step needs to know
+copy_geometry = line_copier(_FIELDS[:_FOUND])
+copy_found = line_copier(_FIELDS[:_PAST])
+copy_past = line_copier(_FIELDS[:_FOUND] + _FIELDS[_PAST:_SLIP])  # for the next step
+copy_slip = line_copier(_FIELDS[_SLIP:_REST])  # and for its friction
 
 
 @kernel

@@ -412,9 +412,7 @@ def move_to_overlap(world, state, applied, left):
         for j in range(cut.fast_count[0]):
             a, b, moves = fast_pair(world, state, j)
             if moves:
-                cut.pairs[0, 0] = a
-                cut.pairs[0, 1] = b
-                if overlaps_now(world, state):
+                if overlap_now(world, state, a, b):
                     return h, OK
     return left, move_part(world, state, applied, left)
 
@@ -427,10 +425,10 @@ def fast_pair(world, state, j):
 
 
 @kernel
-def overlaps_now(world, state):
-    """Return whether a new contact of the first of the listed pairs overlaps."""
+def overlap_now(world, state, a, b):
+    """Return whether a new contact of two shapes overlaps."""
     found = state.arriving
-    count = gaps_of_pairs(world, state, 1)
+    count = gaps_of_pair(world, state, a, b)
     overlaps = False
     velocities_and_marks(world, state, count)
     for i in range(count):
@@ -556,14 +554,20 @@ def lifts(world, state):
         before = contact_before(state, i, 0)
         if before >= 0 and state.previous.normal_force[before] > 0.0:
             continue
-        state.cut.pairs[0, 0] = now.shape_a[i]
-        state.cut.pairs[0, 1] = now.shape_b[i]
-        count = gaps_of_pairs(world, state, 1)
+        count = gaps_of_pair(world, state, now.shape_a[i], now.shape_b[i])
         for k in range(count):
             if same_name(found, k, now, i) and found.gap[k] > CLOSE:
                 now.lift[i] = found.gap[k]
                 some = True
     return some
+
+
+@kernel
+def gaps_of_pair(world, state, a, b):
+    """Write the contacts of two shapes to `arriving`, also those apart; return how many."""
+    state.cut.pairs[0, 0] = a
+    state.cut.pairs[0, 1] = b
+    return gaps_of_pairs(world, state, 1)
 
 
 @kernel

@@ -19,9 +19,9 @@ from iapb.numerics.schema import (
     Booleans,
     FloatPerRow,
     FloatPerVelocity,
-    Floats,
     NumberPerVelocity,
     VelocityMatrix,
+    VelocityRows,
 )
 
 # A row counts as closing if its speed exceeds this share, times d, of the terms that it is summed
@@ -53,7 +53,7 @@ class PushWork(NamedTuple):
 class ShareWork(NamedTuple):
     """Scratch of `share_compression`; `velocity` is the number of rows and one more."""
 
-    tall: Annotated[Floats, "velocity row"]
+    tall: VelocityRows
     aim: FloatPerVelocity
     residual: FloatPerVelocity
     weight: FloatPerRow  # 1/√(number of equal rows); 0 where p_c = 0 for certain
