@@ -8,6 +8,7 @@ from typing import Any
 
 MINUS = "\N{MINUS SIGN}"
 DASH = "\N{EN DASH}"
+TIMES = "\N{NARROW NO-BREAK SPACE}·\N{NARROW NO-BREAK SPACE}"  # a power of ten stays on its line
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 # outside of this range a power of ten reads better than zeros
 _PLAIN_FROM = 1e-3
@@ -27,7 +28,7 @@ def format_number(value: float, digits: int = 4) -> str:
     if float(mantissa) == int(float(mantissa)):
         mantissa = str(int(float(mantissa)))
     power = f"10{str(int(exponent)).translate(_SUPERSCRIPTS)}"
-    return power if mantissa == "1" else f"{mantissa.replace('-', MINUS)} · {power}"
+    return power if mantissa == "1" else f"{mantissa.replace('-', MINUS)}{TIMES}{power}"
 
 
 def power_of_ten(value: float) -> str:

@@ -7,6 +7,8 @@ import re
 
 from markupsafe import Markup, escape
 
+from reports.figures.numbers import MINUS, TIMES
+
 _INLINE = re.compile(r"\$([^$]+)\$")
 _POWER = re.compile(r"(?<![\w.])(-?\d(?:\.\d+)?)e([+-]?\d{1,3})(?!\w)")
 _NEGATIVE = re.compile(r"(?<![\w.-])-(?=\d)")
@@ -32,7 +34,7 @@ def _powers(text: str) -> Markup:
     """Return escaped text in which 2.0e-16 becomes 2.0 · 10⁻¹⁶, -1 gets a true minus sign, and >=
     becomes ≥."""
     signs = str(escape(text.replace(">=", "≥").replace("<=", "≤")))
-    return Markup(_NEGATIVE.sub("\N{MINUS SIGN}", _POWER.sub(_power, signs)))
+    return Markup(_NEGATIVE.sub(MINUS, _POWER.sub(_power, signs)))
 
 
 def _power(match: re.Match[str]) -> str:
@@ -40,12 +42,8 @@ def _power(match: re.Match[str]) -> str:
     exponent = int(match.group(2))
     if float(mantissa) == 0.0:
         return "0"
-    mantissa = mantissa.replace("-", "\N{MINUS SIGN}")
+    mantissa = mantissa.replace("-", MINUS)
     if exponent == 0:
         return mantissa
     power = f"10<sup>{str(exponent).replace('-', chr(0x2212))}</sup>"
-    return (
-        power
-        if mantissa == "1"
-        else f"{mantissa}\N{NARROW NO-BREAK SPACE}·\N{NARROW NO-BREAK SPACE}{power}"
-    )
+    return power if mantissa == "1" else f"{mantissa}{TIMES}{power}"

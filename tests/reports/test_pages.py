@@ -92,7 +92,7 @@ def test_numbers_have_one_format():
         "0.55",
         "1,300",
         "1,296",
-        "3 · 10⁻¹⁴",
+        "3\u202f·\u202f10⁻¹⁴",
         "10⁻⁹",
     ]
     assert [time(0.5512), time(1234.0), time(2.5e6)] == [
