@@ -182,9 +182,12 @@ class Finding:
     timed: bool = False
 
     def __str__(self) -> str:
-        """Return the result, then a line for each part."""
-        parts = (f"  {IN_WORDS[part.verdict]}: {part.sentence}" for part in self.parts)
-        return "\n".join((f"{self.key}, {self.title}: {self.outcome}", self.answer, *parts))
+        """Return the result, the question, and a line for each part."""
+        lines = [f"{self.key}: {self.outcome}", f"  {self.question}"]
+        for part in self.parts:
+            trials = f", {part.held} of {part.decided} trials" if part.decided else ""
+            lines.append(f"  {part.name or part.sentence or 'all'}: {part.outcome}{trials}")
+        return "\n".join(lines)
 
     @property
     def outcome(self) -> str:

@@ -98,7 +98,7 @@ def with_friction(study: Study, case: tuple[float, float]) -> Row:
         "μ": mu,
         "cases": len(impacts),
         "all contacts push": pushing,
-        "share equal to the NCP": same,
+        "equal to the NCP": same,
         "friction reduced": reduced,
         "unsolved": unsolved,
         "NCP gains": sum(g > GAIN for g in of_ncp),
@@ -125,7 +125,7 @@ def _counterparts(impact: ImpactCase, e: float, mu: float) -> Iterator[Floats | 
 
 
 def _friction_targets(table: Table) -> Iterator[Part]:
-    apart = sum(table["all contacts push"]) - sum(table["share equal to the NCP"])
+    apart = sum(table["all contacts push"]) - sum(table["equal to the NCP"])
     yield Part.on("impacts with friction that push and differ from Coulomb's law", apart, 0)
     most = max(table["largest change of KE, IAPB"])
     yield Part.on("largest gain of an impact with friction, of the energy", most, GAIN)
@@ -138,7 +138,7 @@ FRICTION = Check(
     row=with_friction,
     targets=_friction_targets,
     holds=lambda row: bool(
-        row["share equal to the NCP"] == row["all contacts push"]
+        row["equal to the NCP"] == row["all contacts push"]
         and row["largest change of KE, IAPB"] <= GAIN
     ),
 )
