@@ -24,10 +24,10 @@ import numpy as np
 from iapb import resolve_frictional_impact, resolve_impact
 from iapb.errors import IapbError, RangeError
 from iapb.run import Run
-from iapb.scene import Scene, scene_from_text
-from iapb.scene.mechanism import mechanism_of
+from iapb.scene import Scene
 from reference.exact import fractions_of, rational_matrix, relative_energy_gain
 from reference.worlds import run_world
+from verification.certificate import certify
 from verification.hard_cases.case import (
     DEPENDS_ON_ROUNDING,
     NEWTON_COULOMB,
@@ -42,7 +42,7 @@ from verification.hard_cases.case import (
     largest_gain,
     smallest_fault,
 )
-from verification.impacts import EPS
+from verification.impacts import EPS, ImpactCase
 from verification.methods import COMPARED
 from verification.table import Row
 
@@ -82,7 +82,8 @@ def methods_for(case: AnyCase) -> tuple[str, ...]:
 _NUMBERS = (
     "energy gain",  # impacts: the exact (KE⁺ − KE⁻)/KE⁻; motions: see `largest_gain`
     "gain allowed",  # by rounding (10 d ε √κ(M)) or by the time step
-    # max |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|); Poisson's law: the largest approach left
+    # max |Jᵢv⁺ + e Jᵢv⁻| / (‖Aᵢ‖ |u|); Poisson's law: the largest approach left; motions: see
+    # `Certificate.restitution`
     "restitution residual",
     # impacts: |v⁺ − truth| / |v⁻| in the kinetic metric; motions: relative distance from the law
     "forward error",
@@ -115,7 +116,9 @@ def _judge_motion(case: TrajectoryCase, world: str, simulate: Simulate) -> Row:
     except IapbError as error:
         return _row(world, _verdict_of(error), note=str(error))
     found = case.measure(run)
-    residual = restitution_residual(run)
+    # the impulses of a rigid world also close gaps and carry the forces of the step
+    rigid = run.law == "rigid constraints"
+    residual = math.nan if rigid else certify(run).restitution
     restored = not residual > RESTITUTION_TOLERANCE  # NaN: the run has no collision to judge
     gain = largest_gain(run) if found.gain is None else found.gain
     verdict = _verdict(gain <= found.gain_allowed, restored, found.error <= found.error_allowed)
@@ -173,46 +176,6 @@ def faulty_motion(run: Run, fault: float) -> Run:
         moved = creep * run.time[:, None] * np.ones_like(moved)
         sped = creep * np.ones_like(sped)
     return replace(run, q=run.q + fault * moved, v=run.v + fault * sped)
-
-
-def restitution_residual(run: Run) -> float:
-    """Return the largest |p·γ⁺ + e p·γ⁻| / p·(γ⁺ − γ⁻) of all steps with collisions; NaN if there
-    is none to judge.
-
-    p are the normal impulses of the step's contacts, γ⁻ and γ⁺ their normal velocities before and
-    after the impact. If every contact that pushes satisfies γ⁺ = −e γ⁻, the residual is zero. For a
-    rigid world the result is NaN, because its impulses also close gaps and carry the forces of the
-    step.
-    """
-    contacts = run.contacts
-    impacts = run.impacts
-    struck = np.flatnonzero(contacts.impulse)
-    if run.law == "rigid constraints" or not len(struck):
-        return math.nan
-    step = np.repeat(np.arange(run.steps), np.diff(contacts.offsets))[struck]
-    first = np.searchsorted(impacts.step, step)
-    last = np.searchsorted(impacts.step, step, side="right") - 1
-    at_once = impacts.time[first] == impacts.time[last]  # contacts show one moment of a step
-    struck = struck[at_once]
-    step = step[at_once]
-    first = first[at_once]
-    last = last[at_once]
-    mechanism = mechanism_of(scene_from_text(run.scene_source))
-    q = impacts.q[first]
-    point = contacts.point[struck]
-    normal = contacts.normal[struck]
-    rows = mechanism.rows_along(q, contacts.body_a[struck], point, normal)
-    rows -= mechanism.rows_along(q, contacts.body_b[struck], point, normal)
-    rows *= contacts.impulse[struck, None]
-    v_minus = impacts.v_minus[first]
-    v_plus = impacts.v_plus[last]
-    before = np.bincount(step, np.einsum("kd,kd->k", rows, v_minus))
-    after = np.bincount(step, np.einsum("kd,kd->k", rows, v_plus))
-    judged = after - before > 0.0
-    if not judged.any():
-        return math.nan
-    e = float(run.scene_resolved["contact"]["restitution"])
-    return float(np.max(np.abs(after + e * before)[judged] / (after - before)[judged]))
 
 
 class Answer(NamedTuple):
@@ -319,19 +282,16 @@ def _unmet(case: HardCase, v_plus: Floats) -> float:
     """Return the largest relative violation of the law on the given rows; scaled speeds prevent
     underflow."""
     unit = float(np.max(np.abs(case.velocity), initial=0.0)) or 1.0
-    J = case.contact_jacobian
-    v = case.velocity / unit
-    after = v_plus / unit
-    lower = np.linalg.cholesky(case.mass_matrix)
-    scale = np.linalg.norm(np.linalg.solve(lower, J.T), axis=0) * np.linalg.norm(lower.T @ v)
+    impact = ImpactCase(case.mass_matrix, case.contact_jacobian, case.velocity / unit)
+    after = case.contact_jacobian @ (v_plus / unit)
     if np.ndim(case.restitution):
         # Poisson's law: no contact approaches after the impact
-        unmet = np.maximum(-(J @ after), 0.0)
+        unmet = np.maximum(-after, 0.0)
     else:
-        unmet = np.abs(J @ after + case.restitution * (J @ v))
-    return float(
-        np.max(np.divide(unmet, scale, out=np.zeros(len(J)), where=scale > 0.0), initial=0.0)
-    )
+        unmet = np.abs(after + case.restitution * (case.contact_jacobian @ impact.velocity))
+    scale = np.linalg.norm(impact.rows, axis=1) * impact.speed
+    moving = scale > 0.0
+    return float(np.max(unmet[moving] / scale[moving], initial=0.0))
 
 
 def _forward_error(case: HardCase, v_plus: Floats) -> float:
