@@ -89,7 +89,7 @@ def call_times(
     An attempt stops at more than ALLOWED late calls; it is the first one in time, or the first
     whose median call is late, or the last.
     """
-    case = random_impact(d, c, np.random.default_rng([d, c]))
+    case = random_impact(d, c)
     call: Call = kernel_call(case) if method == FACTORED else printed_call(case)
     sample = sampler(call)
     typical = float(np.median([sample() for _ in range(LEAST_ROUNDS)]))

@@ -3,23 +3,24 @@ ones."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from iapb.errors import IapbError
-from verification.impacts import RANK_CUT, ImpactCase
+from verification.impacts import RANK_CUT, Family, ImpactCase, draw_of_rank
 
 _DRAWS = 1000  # most draws of a patch
 # largest difference of two equal changes of velocity, relative to |v⁻|, in the kinetic metric
 _AGREE = 1e-9
 
 
-def random_impact(d: int, c: int, rng: np.random.Generator) -> ImpactCase:
+def random_impact(d: int, c: int) -> ImpactCase:
     """Return a random impact with c rows, whose rank is two thirds of d (or c, if this is less), and
     e = 1/2."""
-    rank = max(1, (2 * d) // 3)
-    root = rng.normal(size=(d, d))
-    rows = rng.normal(size=(c, rank)) @ rng.normal(size=(rank, d))
-    return ImpactCase(root @ root.T + np.eye(d), rows, rng.normal(size=d), 0.5)
+    rank = min(c, max(1, (2 * d) // 3))
+    (case,) = draw_of_rank(Family(d, c, rank, 1e2), 1, d)
+    return replace(case, restitution=0.5)
 
 
 def patch(contacts: int, rng: np.random.Generator) -> ImpactCase:
