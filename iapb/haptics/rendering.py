@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from iapb.contact.kernels.contact_set import trees_of
-from iapb.contact.kernels.motion import LARGEST_SPEED
+from iapb.contact.kernels.motion import LARGEST_SPEED, place_bodies
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.mechanics.kernels.arrays import MechanismArrays, Workspace
 from iapb.mechanics.kernels.configuration import (
@@ -160,7 +160,7 @@ def couple(world, state, port):
     for k in range(len(port.wrench)):
         pushing = pushing or port.wrench[k] != 0.0
     if pushing:
-        forward_kinematics(world.mechanism, state.q, state.body)
+        place_bodies(world, state)
         press(world.mechanism, state.body, port.hand_body, port, port.hand_force)
         if port.coupling != NO_COUPLING:
             forward_kinematics(port.mechanism, port.device_q, port.body)

@@ -64,10 +64,16 @@ STATUS_TEXT = {
 
 
 @kernel
+def place_bodies(world, state):
+    """Place all bodies at q."""
+    forward_kinematics(world.mechanism, state.q, state.body)
+
+
+@kernel
 def locate(world, state):
     """Place all bodies at q; update M and its factor if they depend on q. Return False if M is not
     definite."""
-    forward_kinematics(world.mechanism, state.q, state.body)
+    place_bodies(world, state)
     stale = world.switches.varying_inertia
     if world.conserving and stale:
         stale = not equal(state.q, state.located_q)
@@ -263,7 +269,7 @@ def pull_falling_trees(world, state, applied):
         some = some or falls(world, state, applied, t)
     if not some:
         return
-    forward_kinematics(world.mechanism, state.q, state.body)
+    place_bodies(world, state)
     gravity(world.mechanism, state.body, world.gravity, state.bias)
     solve_tree_blocks(state.lower, world.tree_start, world.tree_stop, state.bias, state.bias)
     add_to_falling_trees(world, state, applied, state.v, -0.5 * state.h[0])

@@ -155,6 +155,8 @@ def twist(world, state, body):
 def contact_velocities(world, state, contacts, count):
     """Write normal_velocity n·(v_a − v_b) and tangential_velocity (the rest of v_a − v_b) of each
     contact."""
+    points = contacts.point
+    normals = contacts.normal
     a = b = -1  # bodies whose twists are computed already: contacts of one pair follow each other
     p_a, u_a, omega_a = p_b, u_b, omega_b = twist(world, state, -1)
     for i in range(count):
@@ -164,8 +166,8 @@ def contact_velocities(world, state, contacts, count):
         if contacts.body_b[i] != b:
             b = contacts.body_b[i]
             p_b, u_b, omega_b = twist(world, state, b)
-        x = load(contacts.point, i)
-        n = load(contacts.normal, i)
+        x = load(points, i)
+        n = load(normals, i)
         relative = add(u_a, cross(omega_a, subtract(x, p_a)))
         if b >= 0:
             relative = subtract(relative, add(u_b, cross(omega_b, subtract(x, p_b))))

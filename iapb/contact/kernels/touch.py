@@ -37,12 +37,18 @@ from iapb.contact.kernels.contact_set import (
 )
 from iapb.contact.kernels.finding import present_contacts
 from iapb.contact.kernels.joint_stops import add_stops, is_stop
-from iapb.contact.kernels.motion import NOT_POSITIVE_DEFINITE, OK, TOO_MANY_CONTACTS, locate, move
+from iapb.contact.kernels.motion import (
+    NOT_POSITIVE_DEFINITE,
+    OK,
+    TOO_MANY_CONTACTS,
+    locate,
+    move,
+    place_bodies,
+)
 from iapb.contact.kernels.narrow_phase import detect
 from iapb.contact.kernels.rows import contact_velocities, twist
 from iapb.contact.kernels.shape_frames import copy_contact, copy_contacts
 from iapb.contact.kernels.world import StepEnd, StepStart
-from iapb.mechanics.kernels.kinematics import forward_kinematics
 from iapb.numerics.compiled import copy_into, kernel
 from iapb.numerics.copying import copier
 from iapb.numerics.linalg import (
@@ -96,7 +102,7 @@ def cut_at_touch(world, state, applied):
 @kernel
 def contacts_at_end(world, state):
     """Write the contacts of the present q and v to `arriving`; return how many, -1: too many."""
-    forward_kinematics(world.mechanism, state.q, state.body)
+    place_bodies(world, state)
     return present_contacts(world, state, state.arriving, state.contacts, state.contact_count[0])
 
 
@@ -573,7 +579,7 @@ def gaps_of_pair(world, state, a, b):
 @kernel
 def gaps_of_pairs(world, state, pairs):
     """Write the contacts of the listed pairs to `arriving`, also those apart; return how many."""
-    forward_kinematics(world.mechanism, state.q, state.body)
+    place_bodies(world, state)
     return detect(
         world.shapes,
         state.cut.pairs[:pairs],

@@ -25,6 +25,12 @@ from iapb.numerics.linalg import (
 
 
 @kernel
+def arm_of_center(w, b):
+    """Return the way from the origin of body b to its centre of mass."""
+    return subtract(load(w.center, b), load(w.position, b))
+
+
+@kernel
 def turned_inertia(m, w, b, omega):
     """Return R I R^T omega of body b alone."""
     return transform(w.rotation, b, transform(m.inertia, b, transform_back(w.rotation, b, omega)))
@@ -121,9 +127,7 @@ def gravity(m, w, g, out):
     axes."""
     for b in range(m.bodies):
         store(w.force, b, scale(-m.mass[b], three(g, 0)))
-        store(
-            w.moment, b, cross(subtract(load(w.center, b), load(w.position, b)), load(w.force, b))
-        )
+        store(w.moment, b, cross(arm_of_center(w, b), load(w.force, b)))
     project_forces(m, w, out)
 
 
@@ -209,7 +213,7 @@ def inverse_dynamics(m, w, v, dv, g, out):
         store(w.angular_velocity, b, omega)
         store(w.angular_acceleration, b, alpha)
         store(w.linear_acceleration, b, a)
-        r = subtract(load(w.center, b), load(w.position, b))
+        r = arm_of_center(w, b)
         f = scale(m.mass[b], add(a, add(cross(alpha, r), cross(omega, cross(omega, r)))))
         own_omega = transform_back(w.rotation, b, omega)
         own_alpha = transform_back(w.rotation, b, alpha)

@@ -13,7 +13,13 @@ from iapb.mechanics.kernels.configuration import (
     turn_vector,
     turn_vector_back,
 )
-from iapb.mechanics.kernels.dynamics import bias, body_velocities, mass_matrix, turned_inertia
+from iapb.mechanics.kernels.dynamics import (
+    arm_of_center,
+    bias,
+    body_velocities,
+    mass_matrix,
+    turned_inertia,
+)
 from iapb.mechanics.kernels.kinematics import add_point_force, forward_kinematics
 from iapb.numerics.compiled import kernel
 from iapb.numerics.elementary import arc_tangent
@@ -96,8 +102,8 @@ def rows_along(m, w, q, body, point, direction, out):
 @kernel
 def center_velocity(w, b):
     """Return the velocity of body b's centre of mass: v_o + omega x (c - o)."""
-    lever = subtract(load(w.center, b), load(w.position, b))
-    return add(load(w.linear_velocity, b), cross(load(w.angular_velocity, b), lever))
+    turning = cross(load(w.angular_velocity, b), arm_of_center(w, b))
+    return add(load(w.linear_velocity, b), turning)
 
 
 @kernel
