@@ -38,10 +38,11 @@ PEG = load_scene(find_scene("peg_corner"))
 def test_of_two_values_the_geometric_mean_counts(
     peg: float | None, floor: float | None, general: float, expected: float
 ) -> None:
-    scene = PEG.with_values(
-        {"bodies.peg.friction": peg, "walls.floor.friction": floor, "contact.friction": general}
+    system = System(
+        PEG.with_values(
+            {"bodies.peg.friction": peg, "walls.floor.friction": floor, "contact.friction": general}
+        )
     )
-    system = System(scene)
     _, found = system.surfaces.by_pair(system.pairs)  # right wall, floor
     assert found == pytest.approx([general if peg is None else peg, expected], rel=1e-15)
 
