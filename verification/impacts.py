@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -657,9 +658,7 @@ def _rows_of_rank(rng: np.random.Generator, family: Family) -> Floats:
 # can be measured. The velocity is u⁻ = −Aᵀw + z with w > 0 and A z = 0. Then p = (1 + e) w pushes
 # at every contact, so the equality law (21) and Newton's LCP have the same v⁺ (up to the rounding
 # of v⁻ in nearly dependent directions).
-TIMED_HARDNESS = tuple(
-    (condition, closeness) for condition in (1e0, 1e3, 1e6) for closeness in (1.0, 1e-3, 1e-6)
-)
+TIMED_HARDNESS = tuple(product((1e0, 1e3, 1e6), (1.0, 1e-3, 1e-6)))
 
 
 def timed_problem(contacts: int, coordinates: int, number: int, seed: int = 0) -> ImpactCase:
@@ -676,13 +675,9 @@ def timed_problem(contacts: int, coordinates: int, number: int, seed: int = 0) -
     mass = with_spectrum(rng, condition ** -np.linspace(0.0, 1.0, d))
     name = f"d={d} c={c} κ(M)={condition:.0e} rows {closeness:.0e} apart"
     case = ImpactCase(mass, _near_rows(rng, d, c, closeness), np.zeros(d), e, name)
-    whitened = case.rows
-    length = np.linalg.norm(case.rows, axis=1)
-    approach = -whitened.T @ (rng.uniform(0.2, 1.0, size=c) / np.where(length > 0.0, length, 1.0))
+    approach = -case.unit_rows.T @ rng.uniform(0.2, 1.0, size=c)
     sliding = rng.normal(size=d)
-    _, values, right = np.linalg.svd(whitened, full_matrices=False)
-    for direction in right[values > 1e-12 * values[0]]:
-        sliding -= (direction @ sliding) * direction
+    sliding -= case.row_space.T @ (case.row_space @ sliding)
     sliding /= max(float(np.linalg.norm(sliding)), 1.0)
     v = np.linalg.solve(case.lower.T, approach / float(np.linalg.norm(approach)) + sliding)
     return replace(case, velocity=v)

@@ -34,6 +34,15 @@ MIDDLE_CHAIN = 0.45  # share of scenes with a linkage, hung in the middle of the
 STACK = 0.4  # share of scenes with a box on the floor and a smaller box or a ball on it
 
 
+# field of contact, its value, and the share of the scenes that have it
+RARE = (
+    ("coherence_distance", 1e-2, 0.5),
+    ("cluster_distance", 1e-3, 0.3),
+    ("self_collisions", True, 0.3),
+    ("penalty", "printed", 0.2),
+)
+
+
 @dataclass(frozen=True)
 class SceneCase:
     """A scene as plain values, its world, and how the device renders impulses beyond its limits."""
@@ -223,15 +232,7 @@ def _contact(rng: np.random.Generator, least_mass: float, dt: float) -> Values:
         # no draw: all other values stay the same
         forces = "paper" if round(1e3 * friction) % 3 == 0 else "implicit"
         contact |= {"forces": forces, "friction": friction, "friction_velocity": 1e-2}
-    if rng.random() < 0.5:
-        contact["coherence_distance"] = 1e-2
-    if rng.random() < 0.3:
-        contact["cluster_distance"] = 1e-3
-    if rng.random() < 0.3:
-        contact["self_collisions"] = True
-    if rng.random() < 0.2:
-        contact["penalty"] = "printed"
-    return contact
+    return contact | {name: value for name, value, share in RARE if rng.random() < share}
 
 
 def _add_hand(rng: np.random.Generator, values: Values, space: _Space) -> None:
