@@ -75,7 +75,7 @@ def refuse_sizes(case: Case, shapes: Mapping[str, tuple[str, ...]]) -> None:
         raise ArgumentError("case", sorted(found), "one value for each size")
 
 
-def matrix_of(rows: Sequence[Sequence[Fraction | int | str]]) -> fmpq_mat:
+def matrix_of(rows: Sequence[Sequence[Fraction | float | str]]) -> fmpq_mat:
     """Return the rational matrix of python-flint."""
     return fmpq_mat([[fmpq(*Fraction(entry).as_integer_ratio()) for entry in row] for row in rows])
 
