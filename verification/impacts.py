@@ -77,6 +77,11 @@ class ImpactCase:
         return len(self.contact_jacobian)
 
     @property
+    def mu(self) -> Any:
+        """Coulomb's μ (c,); 0 without friction."""
+        return np.zeros(self.contacts) if self.friction is None else self.friction
+
+    @property
     def redundancy(self) -> int:
         """Number of rows beyond the rank of J."""
         return (

@@ -143,7 +143,6 @@ def distance_from_cone(case: ImpactCase, target: Floats) -> float:
         return nearest
     (c, d) = case.rows.shape
     m = 0 if case.tangents is None else case.tangents.shape[1]
-    friction = np.zeros(c) if case.friction is None else np.asarray(case.friction, np.float64)
     tangents = case.with_tangents.rows[c:].reshape(c, m, d)
     blocks = np.concatenate([case.rows[:, None], tangents], axis=1)
     size = np.linalg.norm(blocks, axis=(1, 2), keepdims=True)
@@ -152,7 +151,7 @@ def distance_from_cone(case: ImpactCase, target: Floats) -> float:
     impulses = unknowns[1:]
     normal = impulses[:: 1 + m]
     within = impulses.copy()
-    within[:: 1 + m] *= friction[:, None]
+    within[:: 1 + m] *= case.mu[:, None]
     apart = np.vstack([unknowns[:1], -rows.T @ impulses])  # to which the target is added
     values = [apart, normal]
     cones = [clarabel.SecondOrderConeT(1 + d), clarabel.NonnegativeConeT(c)]
@@ -168,7 +167,7 @@ def distance_from_cone(case: ImpactCase, target: Floats) -> float:
     found = clarabel.DefaultSolver(
         csc_matrix(unknowns.shape), unknowns[0], csc_matrix(-matrix), given, cones, settings
     ).solve()
-    p = project_on_cone(np.reshape(found.x[1:], (c, 1 + m)), friction)
+    p = project_on_cone(np.reshape(found.x[1:], (c, 1 + m)), case.mu)
     nearest = min(nearest, float(np.linalg.norm(target - p.ravel() @ rows)))
     return nearest if nearest <= NEAR or found.obj_val_dual > 0.5 * nearest else np.nan
 
@@ -287,33 +286,17 @@ UNILATERAL_LAWS |= {
 
 
 # Friction without restitution, at a single contact or at all contacts together.
-class _Tried(NamedTuple):
-    """A case with e = 0, its independent rows (normals, then tangents; (c + c m, d)) as given and
-    whitened, W and μ."""
-
-    case: ImpactCase
-    given: Floats
-    rows: Floats
-    delassus: Floats
-    friction: Floats
-
-
-def _tried(case: ImpactCase) -> _Tried | None:
-    """The case with its rows and W; None if the rows are too close to dependent to determine the
-    impulses."""
+def _is_determined(case: ImpactCase) -> bool:
+    """Whether normals and tangents are far enough from dependent to determine the impulses."""
     every = case.with_tangents
     if case.friction is None or every.contacts > case.coordinates:
-        return None
-    if np.linalg.svd(every.unit_rows, compute_uv=False)[-1] < CLEAR:
-        return None
-    return _Tried(
-        case, every.contact_jacobian, every.rows, every.rows @ every.rows.T, case.friction
-    )
+        return False
+    return bool(np.linalg.svd(every.unit_rows, compute_uv=False)[-1] >= CLEAR)
 
 
-def _single(case: ImpactCase) -> _Tried | None:
-    """The first contact alone; None if it hardly approaches or its rows are too close to
-    dependent."""
+def _single(case: ImpactCase) -> ImpactCase | None:
+    """The first contact alone, with e = 0; None if it hardly approaches or its rows are too close
+    to dependent."""
     if case.tangents is None or case.friction is None or case.contacts == 0 or case.speed == 0.0:
         return None
     alone = replace(
@@ -324,7 +307,8 @@ def _single(case: ImpactCase) -> _Tried | None:
         restitution=0.0,
         translations=None,
     )
-    return None if _normal_velocities(alone, case.velocity)[0] > -CLEAR else _tried(alone)
+    approaches = _normal_velocities(alone, case.velocity)[0] <= -CLEAR
+    return alone if approaches and _is_determined(alone) else None
 
 
 @law(
@@ -343,13 +327,14 @@ def contacts_stick_where_they_can(case: ImpactCase, resolver: Resolver, bounds: 
     single = _single(case)
     if single is None:
         return None
-    W = single.delassus
-    mu = float(single.friction[0])
-    p = -np.linalg.solve(W, single.given @ case.velocity)
+    every = single.with_tangents
+    W = every.rows @ every.rows.T
+    (mu,) = single.mu
+    p = -np.linalg.solve(W, every.contact_jacobian @ case.velocity)
     kappa = mu * float(np.linalg.norm(W[0, 1:])) / W[0, 0]
     if not mu * p[0] > 1.001 * (1.0 + 2.0 * kappa) * float(np.linalg.norm(p[1:])):
         return None
-    slip = single.given[1:] @ outcome(resolver, single.case)
+    slip = every.contact_jacobian[1:] @ outcome(resolver, single)
     scale = np.sqrt(np.trace(W[1:, 1:])) * case.speed
     return float(np.linalg.norm(slip) / scale), bounds.restitution
 
@@ -372,24 +357,27 @@ def sliding_dissipates_most(case: ImpactCase, resolver: Resolver, bounds: Bounds
     The law checks all contacts together if their rows determine every impulse, else the first
     contact alone. It skips contacts that pull; ``cone`` detects those.
     """
-    several = case.tangents is not None and case.contacts > 1 and case.speed > 0.0
-    tried = (_tried(replace(case, restitution=0.0)) if several else None) or _single(case)
-    if tried is None:
+    tried = replace(case, restitution=0.0)
+    several = case.contacts > 1 and case.speed > 0.0 and _is_determined(tried)
+    chosen = tried if several else _single(case)
+    if chosen is None:
         return None
-    power, limit = _friction_power(tried, resolver)
+    power, limit = _friction_power(chosen, resolver)
     return float(np.max(np.abs(power + limit))), bounds.restitution
 
 
-def _friction_power(tried: _Tried, resolver: Resolver) -> tuple[Floats, Floats]:
+def _friction_power(case: ImpactCase, resolver: Resolver) -> tuple[Floats, Floats]:
     """p_t·v_t⁺ and μ p_n |v_t⁺| of each contact (c,), both relative to |u|²; 0 for a contact that
     pulls."""
-    case = tried.case
+    c = case.contacts
+    every = case.with_tangents
     v_plus = outcome(resolver, case)
-    p = np.linalg.solve(tried.delassus, tried.rows @ (case.lower.T @ (v_plus - case.velocity)))
-    friction = p[case.contacts :].reshape(case.contacts, -1)
-    slip = (tried.given[case.contacts :] @ v_plus).reshape(case.contacts, -1)
-    pushes = (p[: case.contacts] >= 0.0) / case.speed**2
-    limit = tried.friction * p[: case.contacts] * np.linalg.norm(slip, axis=1)
+    change = case.lower.T @ (v_plus - case.velocity)
+    p = np.linalg.solve(every.rows @ every.rows.T, every.rows @ change)
+    friction = p[c:].reshape(c, -1)
+    slip = (every.contact_jacobian[c:] @ v_plus).reshape(c, -1)
+    pushes = (p[:c] >= 0.0) / case.speed**2
+    limit = case.mu * p[:c] * np.linalg.norm(slip, axis=1)
     return pushes * np.einsum("cm,cm->c", friction, slip), pushes * limit
 
 
