@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -86,18 +87,15 @@ def _room(bodies: list[Values], name: str, x: float) -> Values:
             return own | {"position": [body["position"][0] + x, *body["position"][1:]]}
         return own | {"origin": [x, 0.0]}
 
-    middle = ROOM + 1.0
-    upright = [2.0, 6.0]
-    flat = [6.0, 2.0]
-    slabs = (
-        (middle, 0.0, upright),
-        (-middle, 0.0, upright),
-        (0.0, middle, flat),
-        (0.0, -middle, flat),
-    )
+    sides = product(np.eye(2), (1.0, -1.0))
     walls = [
-        {"name": f"{name}_{k}", "kind": "box", "size": size, "center": [x + a, b]}
-        for k, (a, b, size) in enumerate(slabs)
+        {
+            "name": f"{name}_{k}",
+            "kind": "box",
+            "size": (6.0 - 4.0 * axis).tolist(),
+            "center": (sign * (ROOM + 1.0) * axis + [x, 0.0]).tolist(),
+        }
+        for k, (axis, sign) in enumerate(sides)
     ]
     return {"bodies": [moved(body) for body in bodies], "walls": walls}
 
