@@ -28,6 +28,9 @@ _DIGITS = (0, 1, 2, 4, 8)
 _ROUNDED = ("velocity", "contact_jacobian", "tangents", "mass_matrix", "friction", "unequal")
 
 
+Call = tuple[tuple[Any, ...], Floats | str]  # arguments, and v⁺ or fault
+
+
 @dataclass(frozen=True, eq=False)
 class Counterexample:
     """An impact that breaks a law.
@@ -44,7 +47,7 @@ class Counterexample:
     case: ImpactCase
     law: str
     fault: str = ""
-    calls: tuple[tuple[tuple[Any, ...], Floats | str], ...] = ()
+    calls: tuple[Call, ...] = ()
     earlier: tuple[bytes, ...] = ()
     fresh: bool | None = None
 
@@ -177,11 +180,9 @@ class Hunt:
         """Whether a fresh resolver breaks the law after the impact's own call, `count` times."""
         return self.breaks(case, earlier=_again(case, count))
 
-    def calls_for(
-        self, case: ImpactCase, earlier: Sequence[bytes]
-    ) -> tuple[tuple[tuple[Any, ...], Floats | str], ...]:
+    def calls_for(self, case: ImpactCase, earlier: Sequence[bytes]) -> tuple[Call, ...]:
         """Return the calls that the law makes for the impact, each with its answer or fault."""
-        calls: list[tuple[tuple[Any, ...], Floats | str]] = []
+        calls: list[Call] = []
 
         def recorded(*given: Any) -> Floats:
             kept = pickle.loads(pickle.dumps(given))
@@ -289,6 +290,18 @@ def _is_valid(case: ImpactCase) -> bool:
 
 # A counterexample as the source code of a test, to paste next to the resolver.
 
+_TEST = """\
+import numpy as np
+from verification.laws import {table}, ImpactCase
+from verification.laws.bounds import {imported}
+{importing}
+
+
+def test_{law}():
+{body}
+    case = ImpactCase(mass_matrix, contact_jacobian, velocity, {restitution!r}{more})
+    residual = {table}[{law!r}].check(case, {called}, {bounds})
+    assert residual.passed, residual"""
 _ALWAYS = ("mass_matrix", "contact_jacobian", "velocity")
 _OPTIONAL = ("translations", "tangents", "friction", "unequal")
 _BY_NAME = {"KIT": KIT, "FACTORED": FACTORED, "ONE_SIDED": ONE_SIDED}
@@ -310,30 +323,28 @@ def as_test(
     """
     given = {name: getattr(case, name) for name in (*_ALWAYS, *_OPTIONAL)}
     arrays = {name: array for name, array in given.items() if array is not None}
-    more = "".join(f", {name}={name}" for name in _OPTIONAL if name in arrays)
     table = "EXACT_LAWS" if law in EXACT_LAWS else CONTRACTS[contract].table
-    table = "UNEQUAL_LAWS" if law.startswith("unequal_") else table
     name = next((name for name, known in _BY_NAME.items() if known == bounds), "")
-    tolerances = name or repr(bounds).replace("=inf", "=np.inf")
-    head = [
-        f"from verification.laws import {table}, ImpactCase",
-        f"from verification.laws.bounds import {name or 'Bounds'}",
-        import_line(resolver) or "\n# resolver = ...  the one under test",
-    ]
+    importing = import_line(resolver) or "\n# resolver = ...  the one under test"
     called = "resolver"
     if limit < np.inf:
-        head.insert(2, "from verification.laws.child import Child")
+        importing = f"from verification.laws.child import Child\n{importing}"
         called = f"Child(resolver, {limit!r})"
-    lines = [
-        "",
-        "",
-        f"def test_{law}():",
+    body = [
         *_repeating(earlier),
         *(f"    {key} = {written(array)}" for key, array in arrays.items()),
-        f"    case = ImpactCase({', '.join(_ALWAYS)}, {case.restitution!r}{more})",
-        f"    residual = {table}[{law!r}].check(case, {called}, {tolerances})",
     ]
-    return "\n".join(["import numpy as np", *head, *lines, "    assert residual.passed, residual"])
+    return _TEST.format(
+        table="UNEQUAL_LAWS" if law.startswith("unequal_") else table,
+        imported=name or "Bounds",
+        importing=importing,
+        law=law,
+        body="\n".join(body),
+        restitution=case.restitution,
+        more="".join(f", {name}={name}" for name in _OPTIONAL if name in arrays),
+        called=called,
+        bounds=name or repr(bounds).replace("=inf", "=np.inf"),
+    )
 
 
 def _repeating(earlier: Sequence[bytes]) -> Iterator[str]:

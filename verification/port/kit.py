@@ -39,6 +39,24 @@ EDGE_EFFORT = 0.25  # of a whole search, for each of them
 ENOUGH = 4  # motions that break the energy law, of which the shortest is shrunk
 SHRINKING = 5.0  # [s] for a counterexample
 
+_TEST = """\
+import numpy as np
+from verification.port import BareDevice, Motion, judge
+{importing}
+
+
+def test_{law}():
+    device = {device!r}
+    motion = Motion(
+        start={start},
+        lead={lead},
+        cycle={cycle},
+        repeats={repeats},
+    )
+    terms = dict(stored={terms.stored!r}, limit={terms.limit!r})
+    residual = judge({law!r}, resolver, device, motion, **terms)
+    assert residual.passed, residual"""
+
 
 @dataclass
 class ForceVerdict(LawCount):
@@ -102,24 +120,16 @@ class ForceReport(Report):
 
     def test_of(self, law: str, motion: Motion) -> str:
         """Return a counterexample as source code of a test."""
-        parts = (f"{name}={written(getattr(motion, name))}" for name in ("start", "lead", "cycle"))
-        lines = [
-            "import numpy as np",
-            "from verification.port import BareDevice, Motion, judge",
-            import_line(self.tested) or "\n# resolver = ...  the force law under test",
-            "",
-            "",
-            f"def test_{law}():",
-            f"    device = {self.device!r}",
-            "    motion = Motion(",
-            *(f"        {part}," for part in parts),
-            f"        repeats={motion.repeats},",
-            "    )",
-            f"    terms = dict(stored={self.terms.stored!r}, limit={self.terms.limit!r})",
-            f"    residual = judge({law!r}, resolver, device, motion, **terms)",
-            "    assert residual.passed, residual",
-        ]
-        return "\n".join(lines)
+        return _TEST.format(
+            importing=import_line(self.tested) or "\n# resolver = ...  the force law under test",
+            law=law,
+            device=self.device,
+            start=written(motion.start),
+            lead=written(motion.lead),
+            cycle=written(motion.cycle),
+            repeats=motion.repeats,
+            terms=self.terms,
+        )
 
     def _text(self) -> str:
         device = self.device

@@ -24,6 +24,7 @@ from verification.proofs.statement import Statement
 
 Comparisons = tuple[Comparison, ...]
 Twins = tuple[tuple[str, Comparison, str], ...]  # title, false comparison, note
+Compared = tuple[Comparisons, Twins]
 # exact_instances
 CASES = 40
 SEED = 20050301
@@ -35,7 +36,7 @@ def _is(says: str, left: Fraction | int, relation: str, right: Fraction | int | 
     return Comparison(says, Fraction(left), relation, Fraction(right))
 
 
-def erratum_rank() -> tuple[Comparisons, Twins]:
+def erratum_rank() -> Compared:
     all_rows, left_over = (fmpq_mat([[1]] * count).rank() for count in (3, 2))
     return (
         _is("the rank of all three rows, so n = 1", all_rows, "=", 1),
@@ -69,7 +70,7 @@ def _energy_after(a: Fraction, t: Fraction, last: Fraction) -> Fraction:
     return (p[0] + a * p[1]) ** 2 + (1 + t * p[1]) ** 2
 
 
-def fp_gram_pinv() -> tuple[Comparisons, Twins]:
+def fp_gram_pinv() -> Compared:
     cut = energy_factor_above_cutoff(19)
     return (
         *(
@@ -124,7 +125,7 @@ def pseudo_inverse(matrix: fmpq_mat) -> fmpq_mat:
     return matrix_of([[str(entry) for entry in row] for row in found.tolist()])
 
 
-def exact_instances() -> tuple[Comparisons, Twins]:
+def exact_instances() -> Compared:
     """Theorem 2 on random rational impacts: the kernel with python-flint, and SymPy, each reads
     theorem_2 by itself."""
     block = layout.block("theorem_2")
@@ -158,12 +159,12 @@ def exact_instances() -> tuple[Comparisons, Twins]:
     ), (("the printed loss holds in all cases", _is("cases", wrong, "=", CASES), ""),)
 
 
-BY_STATEMENT: dict[str, Callable[[], tuple[Comparisons, Twins]]] = {
+BY_STATEMENT: dict[str, Callable[[], Compared]] = {
     each.__name__: each for each in (erratum_rank, fp_gram_pinv, exact_instances)
 }
 
 
-def comparisons_of(block: layout.Block) -> tuple[Comparisons, Twins]:
+def comparisons_of(block: layout.Block) -> Compared:
     """Return the comparisons of a statement and the false ones."""
     if block.name in BY_STATEMENT:
         return BY_STATEMENT[block.name]()
