@@ -45,6 +45,11 @@ CALL_LIMIT = 60.0  # [s]
 SHRINKING = 60.0  # [s] for a counterexample
 LITTLE_TIME = 2.0  # [s] for it where the patience is at its end
 ITERATED = 1e-4  # largest residual that the accuracy of an iteration may explain
+_HINT = (
+    "No error is above {wider}, which an iteration that ends early can explain. Widen the "
+    "tolerances: bounds=dataclasses.replace(verification.laws.bounds.{table}, least={wider}, "
+    "restitution={wider}). Errors below {wider} of v are not noticed then"
+)
 
 
 @dataclass
@@ -251,12 +256,7 @@ class PassivityReport(Report):
             return ""
         wider = 10.0 ** np.ceil(np.log10(largest))
         table = "KIT" if self.contract == "equality" else "ONE_SIDED"
-        return (
-            f"No error is above {wider:.0e}, which an iteration that ends early can explain. "
-            "Widen the tolerances: bounds=dataclasses.replace(verification.laws.bounds."
-            f"{table}, least={wider:.0e}, restitution={wider:.0e}). "
-            f"Errors below {wider:.0e} of v are not noticed then"
-        )
+        return _HINT.format(table=table, wider=f"{wider:.0e}")
 
     def _text(self) -> str:
         word = "passed" if self.passed else "NOT FINISHED" if not self.broken_laws else "FAILED"

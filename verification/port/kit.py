@@ -39,6 +39,16 @@ EDGE_EFFORT = 0.25  # of a whole search, for each of them
 ENOUGH = 4  # motions that break the energy law, of which the shortest is shrunk
 SHRINKING = 5.0  # [s] for a counterexample
 
+_HEAD = (
+    "{one.law}: {word} on a device of {one.device.damping:g} N s/m and {one.device.friction:g} N "
+    "at {one.device.rate:g} Hz"
+)
+_ANY_HAND = """\
+  any hand: it needs {enough} (with {one.device.friction:g} N of friction),
+            or {least}{one.friction_needed:.4g} N of friction (with {one.device.damping:g} N s/m)"""
+_SLOW_HANDS = "  hands slower than {one.fastest:g} Hz: {one.slow_damping:.4g} N s/m (measured)"
+_NO_FORCE = "  it gave no force, so the search ended; x and v were {}, like the start"
+_CALLS = "  {one.calls:,} calls in {one.seconds:.1f} s, seed {one.seed}"
 _TEST = """\
 import numpy as np
 from verification.port import BareDevice, Motion, judge
@@ -132,39 +142,39 @@ class ForceReport(Report):
         )
 
     def _text(self) -> str:
-        device = self.device
         fails = self.broken_laws or self.damping_needed == np.inf
         word = "passed" if self.passed else "FAILED" if fails else "NOT FINISHED"
-        lines = [
-            f"{self.law}: {word} on a device of {device.damping:g} N s/m and {device.friction:g} N "
-            f"at {device.rate:g} Hz",
-            *(self._no_force() if "finite" in self.broken_laws else self._needs()),
-        ]
+        lines = [_HEAD.format(one=self, word=word)]
+        if "finite" in self.broken_laws:
+            lines.append(_NO_FORCE.format(self._given))
+        else:
+            lines.append(_ANY_HAND.format(one=self, enough=self._enough, least=self._least))
+            lines += [] if self.slow_damping is None else [_SLOW_HANDS.format(one=self)]
         if self.unfinished:
             lines.append(f"  {self.unfinished}")
         lines += [str(verdict) for verdict in self.verdicts]
-        lines.append(f"  {self.calls:,} calls in {self.seconds:.1f} s, seed {self.seed}")
+        lines.append(_CALLS.format(one=self))
         for law, motion, fault in self.found:
             title = f"counterexample to {law}, {len(motion.positions)} samples:"
             lines += ["", title, *([f"  {fault}"] if fault else []), "", "as a test:", ""]
             lines.append(self.test_of(law, motion))
         return "\n".join(lines)
 
-    def _needs(self) -> Iterator[str]:
-        device = self.device
-        least = "at least " if self.unfinished else ""
-        enough = f"{least}{self.damping_needed:.4g} N s/m"
-        if self.damping_needed == np.inf:
-            enough = "more than any damping"
-        yield f"  any hand: it needs {enough} (with {device.friction:g} N of friction),"
-        yield f"            or {least}{self.friction_needed:.4g} N of friction (with {device.damping:g} N s/m)"
-        if self.slow_damping is not None:
-            yield f"  hands slower than {self.fastest:g} Hz: {self.slow_damping:.4g} N s/m (measured)"
+    @property
+    def _least(self) -> str:
+        return "at least " if self.unfinished else ""
 
-    def _no_force(self) -> Iterator[str]:
+    @property
+    def _enough(self) -> str:
+        if self.damping_needed == np.inf:
+            return "more than any damping"
+        return f"{self._least}{self.damping_needed:.4g} N s/m"
+
+    @property
+    def _given(self) -> str:
+        """What the law got as x and v in the counterexample."""
         size = len(self.found[0][1].start)
-        given = "numbers" if size == 1 else f"arrays ({size},)"
-        yield f"  it gave no force, so the search ended; x and v were {given}, like the start"
+        return "numbers" if size == 1 else f"arrays ({size},)"
 
 
 def check_force(
