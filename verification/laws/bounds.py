@@ -35,6 +35,11 @@ class LawResidual:
         return 0.0 if self.value <= 0.0 and math.isfinite(self.value) else np.inf
 
     @property
+    def rank(self) -> tuple[float, float]:
+        """What makes it worse than others: its ratio, then its value."""
+        return self.ratio, self.value
+
+    @property
     def words(self) -> str:
         """The value and its tolerance."""
         return f"error {self.value:.1e}, limit {self.tolerance:.1e}"
@@ -59,17 +64,14 @@ class LawCount:
         """Count one case; return whether the law holds in it."""
         self.checked += 1
         self.failures += not residual.passed
-        if self.worst is None or (residual.ratio, residual.value) > (
-            self.worst.ratio,
-            self.worst.value,
-        ):
+        if self.worst is None or residual.rank > self.worst.rank:
             self.worst = residual
         return residual.passed
 
     def __add__(self, other: LawCount) -> LawCount:
         """Return the counts of two sets of cases of one law."""
         residuals = [count.worst for count in (self, other) if count.worst is not None]
-        worst = max(residuals, key=lambda residual: residual.ratio, default=None)
+        worst = max(residuals, key=lambda residual: residual.rank, default=None)
         return LawCount(
             self.law, self.checked + other.checked, self.failures + other.failures, worst
         )

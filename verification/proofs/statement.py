@@ -20,7 +20,7 @@ from verification.proofs.words import (
     product,
 )
 
-_INFERENCES = {"cancelling": "cancel", "dividing": "divide", "dominating": "dominate"}
+_INFERENCES = ("cancelling", "dividing", "dominating")
 
 
 @dataclass
@@ -80,7 +80,7 @@ class Statement:
         if entry.key in ("lemma", "show"):
             self.tasks.append(Task(self.reader.fact(entry.formula, entry.words), entry))
         elif entry.formula in _INFERENCES:
-            self.tasks[-1].method = _INFERENCES[entry.formula]
+            self.tasks[-1].method = entry.formula
         elif entry.key == "by":
             self.tasks[-1].cofactors += map(_cofactor, self.reader.products(entry.formula))
         else:

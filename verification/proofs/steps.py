@@ -4,9 +4,9 @@ expansion alone.
 sum        claim.lhs − claim.rhs = sum of non-negative terms
            + sum of  left * (equation.lhs − equation.rhs) * right;
            an equation has no non-negative terms
-cancel     N = 0, since N' X N = 0 (or ≤ 0) with X positive definite (or without an X)
-divide     N = 0, since s N = 0 and the number s is not 0
-dominate   x ≥ 0, since q x − x² ≥ 0 and q ≥ 0 (scalars)
+cancelling N = 0, since N' X N = 0 (or ≤ 0) with X positive definite (or without an X)
+dividing   N = 0, since s N = 0 and the number s is not 0
+dominating x ≥ 0, since q x − x² ≥ 0 and q ≥ 0 (scalars)
 
 docs/proofs.md lists what each step needs, with a statement that lacks it.
 """
@@ -42,8 +42,7 @@ class Refused(IapbError):
 @dataclass(frozen=True)
 class Step:
     """A claim and its certificate: non-negative terms (each the factors of a product), and
-    cofactors, which are zero; for `cancel`, `divide` and `dominate` the two facts that it follows
-    from."""
+    cofactors, which are zero; for the other rules the two facts that it follows from."""
 
     claim: Fact
     terms: tuple[Factors, ...] = ()
@@ -113,7 +112,7 @@ def prove(
 
 
 def infer(claim: Fact, method: str, known: Known) -> Step:
-    """Return the step by `cancel`, `divide` or `dominate`; Refused if no known facts fit."""
+    """Return the step by `cancelling`, `dividing` or `dominating`; Refused if no known facts fit."""
     for source, other in pairs(known.facts, (None, *known.facts)):
         if _follows(method, claim, source, other):
             sources = (source,) if other is None else (source, other)
@@ -174,14 +173,14 @@ def _follows(method: str, claim: Fact, source: Fact, other: Fact | None) -> bool
     value = source.difference
     kind = "" if other is None else other.relation
     core = ONE if other is None else other.difference
-    if method == "cancel" and claim.relation == "=" and source.relation in "=≥⪰":
+    if method == "cancelling" and claim.relation == "=" and source.relation in "=≥⪰":
         return (other is None or (kind == "≻" and core.rows == x.rows)) and _same(
             x.T * core * x, value if source.relation == "=" else -value
         )
-    if method == "divide" and claim.relation == source.relation == "=":
+    if method == "dividing" and claim.relation == source.relation == "=":
         return kind == "≠" and core.is_number and _same(core * x, value)
     return (
-        method == "dominate"
+        method == "dominating"
         and claim.relation == source.relation == kind == "≥"
         and x.rows == core.rows == ANY
         and _same(core * x - x * x, value)

@@ -24,6 +24,7 @@ from iapb.errors import ArgumentError
 
 ANY = "*"  # the size of a multiple of the identity, which fits every square shape
 _POWERS = "⁰¹²³⁴⁵⁶⁷⁸⁹"
+_RAISED = str.maketrans("0123456789", _POWERS)
 
 
 class Letter(NamedTuple):
@@ -110,10 +111,7 @@ class Expression:
         unit = [] if self.rows in (ANY, "1") else ["I"]
         for (scalars, word), coefficient in self.ordered():
             counts = [(name, len(list(group))) for name, group in groupby(scalars)]
-            factors = [
-                name + ("" if power == 1 else "".join(_POWERS[int(digit)] for digit in str(power)))
-                for name, power in counts
-            ]
+            factors = [name + str(power).translate(_RAISED) * (power > 1) for name, power in counts]
             factors += [each.name + "ᵀ" * each.flipped for each in word] or unit
             size = [] if abs(coefficient) == 1 and factors else [str(abs(coefficient))]
             sign = "−" if coefficient < 0 else "+" if pieces else ""
