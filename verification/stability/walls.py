@@ -14,11 +14,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 from scipy.linalg import expm
 
 from reference import Floats
+from verification.port.baselines.impulses import ImpulseWall
+from verification.port.baselines.penalty import PenaltyWall
 
 PENALTY = "penalty"
 IMPULSES = "impulses"
@@ -76,32 +79,30 @@ def touch_walls(loop: Loop, stiffness: Floats, damping: Floats, law: str) -> Flo
     stiffness, damping : K [N/m] and B [N s/m] of the walls, in shapes that broadcast
     law : "penalty" or "impulses"
     """
-    (K, B) = np.broadcast_arrays(stiffness, damping)
+    shape = np.broadcast_shapes(np.shape(stiffness), np.shape(damping))
+    wall: Any = PenaltyWall(stiffness, damping)
+    if law == IMPULSES:
+        wall = ImpulseWall(wall, loop.mass, loop.restitution)
+        wall.reset(loop.step)
     r = loop.resolution
     steps = round(loop.seconds * loop.rate)
 
     def sensed(x: Floats) -> Floats:
         return np.round(x / r) * r if r > 0.0 else x.copy()
 
-    x = np.full(K.shape, -loop.distance)
-    v = np.full(K.shape, loop.speed)
+    x = np.full(shape, -loop.distance)
+    v = np.full(shape, loop.speed)
     first = sensed(x)
     # those that are delayed, oldest first
     readings = [first - loop.speed * loop.step, *[first] * (loop.delay + 1)]
-    commands = [np.zeros(K.shape) for _ in range(loop.delay)]
-    positions, speeds = (np.empty((steps, *K.shape)) for _ in range(2))
+    commands = [np.zeros(shape) for _ in range(loop.delay)]
+    positions, speeds = (np.empty((steps, *shape)) for _ in range(2))
     free, moved, held = _held_force(loop)
     for k in range(steps):
         readings = [*readings[1:], sensed(x)]
         before, now = readings[:2]
-        rate = (now - before) / loop.step
-        command = np.where(now > 0.0, np.maximum(K * now + B * rate, 0.0), 0.0)
-        if law == IMPULSES:
-            blow = (1.0 + loop.restitution) * loop.mass * np.maximum(rate, 0.0) / loop.step
-            command = np.where((now > 0.0) & (before <= 0.0), blow, command)
-        commands.append(command)
-        force = commands.pop(0)
-        acceleration = (loop.push - force) / loop.mass
+        commands.append(wall.step(now, (now - before) / loop.step))
+        acceleration = (loop.push + commands.pop(0)) / loop.mass
         x = x + moved * v + held * acceleration
         v = free * v + moved * acceleration
         diverged = ~(np.abs(x) < 1e3)  # metres: the motion diverges and would overflow

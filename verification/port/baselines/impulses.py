@@ -8,13 +8,15 @@ jumps by (1 + e) m v / T.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from verification.port.baselines.penalty import PenaltyWall
 
 
 @dataclass
 class ImpulseWall:
-    """An impulse when a reading is the first inside the wall, else the penalty wall."""
+    """An impulse when a reading is the first inside the wall, else the penalty wall; also of
+    arrays."""
 
     penalty: PenaltyWall
     mass: float = 2.0
@@ -23,10 +25,10 @@ class ImpulseWall:
     def reset(self, dt: float) -> None:
         """Begin outside the wall."""
         self.gain = (1.0 + self.restitution) * self.mass / dt
-        self.inside = False
+        self.inside: Any = False
 
-    def step(self, x: float, v: float) -> float:
+    def step(self, x: Any, v: Any) -> Any:
         """Return the force on the hand [N]."""
-        new = x > 0.0 and not self.inside
+        new = (x > 0.0) > self.inside
         self.inside = x > 0.0
-        return -self.gain * max(v, 0.0) if new else self.penalty.step(x, v)
+        return new * -self.gain * (v > 0.0) * v + (1 - new) * self.penalty.step(x, v)

@@ -7,15 +7,17 @@ application to haptic interfaces", Journal of Robotic Systems 14(1), 37-47, 1997
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 
 @dataclass(frozen=True)
 class PenaltyWall:
-    """F = −max(K x + B v, 0) inside the wall, x > 0 [m]."""
+    """F = −max(K x + B v, 0) inside the wall, x > 0 [m]; also of arrays."""
 
-    stiffness: float
-    damping: float = 0.0
+    stiffness: Any
+    damping: Any = 0.0
 
-    def step(self, x: float, v: float) -> float:
+    def step(self, x: Any, v: Any) -> Any:
         """Return the force on the hand [N]."""
-        return -max(self.stiffness * x + self.damping * v, 0.0) if x > 0.0 else 0.0
+        push = self.stiffness * x + self.damping * v
+        return ((x > 0.0) & (push > 0.0)) * -push
