@@ -8,6 +8,7 @@ the processor, and where W = J M⁻¹ Jᵀ is formed, its condition number ampli
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import wraps
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,41 @@ import numpy as np
 from iapb.contact.kernels.impact import rank_tolerance
 from iapb.errors import ArgumentError
 from verification.impacts import EPS, Floats, ImpactCase
+
+Method = Callable[..., Any]
+
+
+# A correct method, independent of the engine. The planted bugs of the laws are made from its parts.
+RANK_CUT = 1e-10
+
+
+def whitened(change: Callable[..., Floats]) -> Method:
+    """Return the resolver with u⁺ = change(A, u, e) for u = Lᵀv, M = L Lᵀ and the unit rows A."""
+
+    @wraps(change)
+    def resolver(M: Floats, J: Floats, v: Floats, *given: Any, **more: Any) -> Floats:
+        case = ImpactCase(M, J, v)
+        return np.linalg.solve(case.lower.T, change(case.unit_rows, case.u, *given, **more))
+
+    del resolver.__wrapped__  # the arguments are those of a resolver
+    return resolver
+
+
+def row_space(A: Floats, cut: float = RANK_CUT) -> Floats:
+    _, values, right = np.linalg.svd(A, full_matrices=False)
+    return right[values > cut]
+
+
+@whitened
+def projecting(A: Floats, u: Floats, factor: float, cut: float = RANK_CUT) -> Floats:
+    Q = row_space(A, cut)
+    return u - factor * (Q.T @ (Q @ u))
+
+
+def sound_resolver(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
+    """Return v⁺ from u⁺ = u − (1 + e) Qᵀ Q u, with Q from the singular value decomposition of the
+    unit rows of A."""
+    return projecting(M, J, v, 1.0 + e)
 
 
 def gram_pinv(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
@@ -61,14 +97,11 @@ def damped(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
 def svd(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
     """Return v⁺ by (21) with the projector from the truncated singular value decomposition of the
     unit rows of A."""
-    case = ImpactCase(M, J, v)
-    _, singular, right = np.linalg.svd(case.unit_rows, full_matrices=False)
-    Q = right[singular > rank_tolerance(case.lower)]
-    return np.asarray(np.linalg.solve(case.lower.T, case.u - (1.0 + e) * Q.T @ (Q @ case.u)))
+    return projecting(M, J, v, 1.0 + e, cut=rank_tolerance(np.linalg.cholesky(M)))
 
 
 # To add a method, add a line here.
-COMPARED: dict[str, Callable[..., Any]] = {
+COMPARED: dict[str, Method] = {
     "gram_pinv": gram_pinv,
     "gram_cholesky": gram_cholesky,
     "damped": damped,

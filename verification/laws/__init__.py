@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from verification.laws.kit import PassivityReport as PassivityReport
     from verification.laws.kit import check_passivity as check_passivity
     from verification.laws.planted import PLANTED_BUGS as PLANTED_BUGS
-    from verification.laws.resolver import sound_resolver as sound_resolver
+    from verification.methods import sound_resolver as sound_resolver
 
 _HOME = {
     "ImpactCase": "verification.impacts",
@@ -36,7 +36,7 @@ _HOME = {
     "PassivityReport": "verification.laws.kit",
     "check_passivity": "verification.laws.kit",
     "PLANTED_BUGS": "verification.laws.planted",
-    "sound_resolver": "verification.laws.resolver",
+    "sound_resolver": "verification.methods",
 }
 
 __getattr__, __dir__, __all__ = lazy_names(__name__, _HOME)

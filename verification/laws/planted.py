@@ -14,16 +14,10 @@ from iapb.run import Run
 from iapb.system import System
 from verification.impacts import Floats, ImpactCase
 from verification.laws.bounds import LawResidual
-from verification.laws.resolver import (
-    RANK_CUT,
-    Resolver,
-    projecting,
-    row_space,
-    sound_resolver,
-    whitened,
-)
+from verification.laws.resolver import Resolver
 from verification.laws.scenes import SceneCase
 from verification.laws.trajectories import TRAJECTORY_LAWS, Trajectory
+from verification.methods import RANK_CUT, projecting, row_space, sound_resolver, whitened
 
 
 class Fault(NamedTuple):

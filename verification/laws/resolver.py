@@ -1,12 +1,10 @@
-"""Calls of any resolver with checks of its answer, and a correct resolver in plain numpy,
-independent of the engine."""
+"""Calls of any resolver with checks of its answer."""
 
 from __future__ import annotations
 
 import pickle
 from collections import deque
 from collections.abc import Callable
-from functools import wraps
 from typing import Any
 
 import numpy as np
@@ -122,36 +120,3 @@ def _velocity(
     if isinstance(resolver, Watched) and not isinstance(velocity, ResolverFault):
         resolver.look_at(case, velocity)
     return velocity
-
-
-# The correct resolver; the planted bugs are made from its parts.
-RANK_CUT = 1e-10
-
-
-def whitened(change: Callable[..., Floats]) -> Resolver:
-    """Return the resolver with u⁺ = change(A, u, e) for u = Lᵀv, M = L Lᵀ and the unit rows A."""
-
-    @wraps(change)
-    def resolver(M: Floats, J: Floats, v: Floats, *given: Any, **more: Any) -> Floats:
-        case = ImpactCase(M, J, v)
-        return np.linalg.solve(case.lower.T, change(case.unit_rows, case.u, *given, **more))
-
-    del resolver.__wrapped__  # the arguments are those of a resolver
-    return resolver
-
-
-def row_space(A: Floats, cut: float = RANK_CUT) -> Floats:
-    _, values, right = np.linalg.svd(A, full_matrices=False)
-    return right[values > cut]
-
-
-@whitened
-def projecting(A: Floats, u: Floats, factor: float, cut: float = RANK_CUT) -> Floats:
-    Q = row_space(A, cut)
-    return u - factor * (Q.T @ (Q @ u))
-
-
-def sound_resolver(M: Floats, J: Floats, v: Floats, e: float) -> Floats:
-    """Return v⁺ from u⁺ = u − (1 + e) Qᵀ Q u, with Q from the singular value decomposition of the
-    unit rows of A."""
-    return projecting(M, J, v, 1.0 + e)

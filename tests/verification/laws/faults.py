@@ -16,7 +16,8 @@ from reference.complementarity import ImpactProblem, solve
 from reference.complementarity.laws import poisson as poisson_of
 from reference.exact import exact_impact
 from verification.impacts import Floats
-from verification.laws.resolver import Resolver, sound_resolver
+from verification.laws.resolver import Resolver
+from verification.methods import sound_resolver
 
 TOO_MUCH = Fraction(10001, 10000)  # factor on the impulse that e requires
 Impulses = tuple[Floats, Floats]
