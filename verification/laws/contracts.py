@@ -35,6 +35,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from iapb.errors import SolverError
 from reference.complementarity.solution import project_on_cone
 from reference.complementarity.solvers.qp import daqp
 from reference.exact import relative_energy_gain
@@ -117,14 +118,19 @@ def contacts_only_push(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> 
 
 
 def pushed(rows: Floats, target: Floats) -> Floats:
-    """Return the point Aᵀp (d,) with p ≥ 0 that is closest to the target (d,).
+    """Return the point Aᵀp (d,) with p ≥ 0 that is closest to the target (d,); NaN if daqp finds
+    none.
 
     A contact of its own, along a direction of its own, gives daqp's accuracy the target's scale.
     """
     every = np.pad(np.asarray(rows, np.float64), ((0, 1), (0, 1)))
     every[-1, -1] = 1.0
     whole = np.append(np.asarray(target, np.float64), np.linalg.norm(target))
-    return np.asarray(rows.T @ daqp(every, -every @ whole)[:-1])
+    try:
+        p = daqp(every, -every @ whole)[:-1]
+    except SolverError:
+        p = np.full(len(rows), np.nan)
+    return np.asarray(rows.T @ p)
 
 
 def distance_from_cone(case: ImpactCase, target: Floats) -> float:
@@ -168,7 +174,7 @@ def distance_from_cone(case: ImpactCase, target: Floats) -> float:
         csc_matrix(unknowns.shape), unknowns[0], csc_matrix(-matrix), given, cones, settings
     ).solve()
     p = project_on_cone(np.reshape(found.x[1:], (c, 1 + m)), case.mu)
-    nearest = min(nearest, float(np.linalg.norm(target - p.ravel() @ rows)))
+    nearest = float(np.fmin(nearest, np.linalg.norm(target - p.ravel() @ rows)))
     return nearest if nearest <= NEAR or found.obj_val_dual > 0.5 * nearest else np.nan
 
 
@@ -229,8 +235,10 @@ def mixed_impacts_follow_newton_or_poisson(
     newton = u + (1.0 + e) * pushed(rows, -u)
     poisson = newton + pushed(rows, -newton)
     found = case.lower.T @ own_outcome(resolver, case)
-    nearer = min(float(np.linalg.norm(found - answer)) for answer in (newton, poisson))
-    return nearer / case.speed, max(bounds.restitution, bounds.comparison(case))
+    distances = np.linalg.norm(np.subtract(found, [newton, poisson]), axis=1) / case.speed
+    if np.isnan(distances).any():
+        return None
+    return float(distances.min()), max(bounds.restitution, bounds.comparison(case))
 
 
 @law(UNILATERAL_LAWS, "separating", "where no contact approaches v is left as it is")
