@@ -113,30 +113,25 @@ class Certificate:
         """Return one line that says what is certified, what fails and what is not judged."""
         shares = self._shares.items()
         wrong = [name for name, share in shares if share > 1.0]
+        held = [name for name, share in shares if share <= 1.0]
+        unjudged = [name for name, share in shares if np.isnan(share)]
         if not self.impacts:
-            return (
-                f"no impact, and what is recorded does not fit: {', '.join(wrong)}"
-                if wrong
-                else "no impact: nothing to certify"
+            unfit = f"no impact, and what is recorded does not fit: {', '.join(wrong)}"
+            return unfit if wrong else "no impact: nothing to certify"
+        if self.gains:
+            energy = (
+                f"{self.gains} of {self.impacts} impacts gained energy (exact). Springs return "
+                "stored energy: judge such a contact from first touch to last."
             )
-        energy = (
-            f"{self.gains} of {self.impacts} impacts gained energy"
-            if self.gains
-            else f"none of {self.impacts} impacts gained energy, not in the last bit"
-        )
-        held = ["no gain"] * (not self.gains) + [name for name, share in shares if share <= 1.0]
-        reported = " (only reported)" * (not np.isnan(self.restitution))
-        open_ = [
-            name + reported * (name == "restitution") for name, share in shares if np.isnan(share)
-        ]
+        else:
+            energy = f"none of {self.impacts} impacts gained energy, not in the last bit (exact)."
+            held = ["no gain", *held]
+        if "restitution" in unjudged and not np.isnan(self.restitution):
+            unjudged[unjudged.index("restitution")] = "restitution (only reported)"
         fits = f" Recorded impulses and velocities do not fit: {'; '.join(wrong)}." if wrong else ""
-        springs = (
-            " Springs return stored energy: judge such a contact from first touch to last."
-            * bool(self.gains)
-        )
         return (
-            f"{energy} (exact).{springs} Certified: {'; '.join(held) or 'nothing'}.{fits} "
-            f"Not judged: {'; '.join([*open_, 'forces between impacts'])}."
+            f"{energy} Certified: {'; '.join(held) or 'nothing'}.{fits} "
+            f"Not judged: {'; '.join([*unjudged, 'forces between impacts'])}."
         )
 
     __str__ = words
