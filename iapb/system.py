@@ -289,7 +289,6 @@ class System:
         port = Port(
             **blank(quantities(Port), lengths),
             coupling=coupling.kind,
-            device=not isinstance(coupling, NoCoupling),
             hand=hand is not None,
             tool_tree=self.tool_tree,
             q_start=q_start,

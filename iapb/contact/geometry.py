@@ -60,9 +60,6 @@ class Shapes(NamedTuple):
     # (n, 3, 3) box: its axes as columns; half-space: column 2 is the unit outward normal
     axes: Floats
     half_size: Floats  # (n, 3) [m] of a box, along its axes
-    space: bool  # whether they are shapes in space
-    polygons: bool  # whether one of them is a polygon
-    balls: bool  # whether two of them are circles or spheres
 
 
 class ContactBuffer(NamedTuple):
@@ -120,8 +117,8 @@ class Shape(NamedTuple):
     half_size: Any = (0.0, 0.0, 0.0)
 
 
-def make_shapes(given: Sequence[Shape], space: bool) -> Shapes:
-    """Return the arrays of the given shapes in their order; `space`: they are shapes in space."""
+def make_shapes(given: Sequence[Shape]) -> Shapes:
+    """Return the arrays of the given shapes in their order."""
     kind, body, radius, vertices, center, axes, half_size = (
         zip(*given, strict=True) if given else [()] * 7
     )
@@ -137,9 +134,6 @@ def make_shapes(given: Sequence[Shape], space: bool) -> Shapes:
         np.array(center, float).reshape(n, 3),
         np.array(axes, float).reshape(n, 3, 3),
         np.array(half_size, float).reshape(n, 3),
-        space,
-        POLYGON in kind,
-        sum(one in (CIRCLE, SPHERE) for one in kind) > 1,
     )
 
 

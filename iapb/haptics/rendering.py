@@ -42,8 +42,7 @@ class Port(NamedTuple):
     """Hand, coupling and device of one world; `iapb.system` makes it from the fields."""
 
     coupling: int  # NO_COUPLING, FOUR_CHANNEL, UNILATERAL
-    device: bool  # whether there is one
-    hand: bool  # whether there is one
+    hand: bool  # whether a hand holds the tool
     tool_tree: int  # -1: no tool is held
     q_start: int  # the tool's range in q
     q_stop: int

@@ -76,7 +76,6 @@ def collect_arrays(bodies: tuple[Body, ...], parents: list[int]) -> MechanismArr
         dof_leader=dof_leader,
         dof_ratio=dof_ratio,
         dof_offset=dof_offset,
-        quaternions=any(layout.code in (SPHERICAL, FREE_FLYER) for layout in layouts),
     )
 
 
@@ -120,7 +119,7 @@ def moving_parts(m: MechanismArrays) -> MechanismArrays:
         own.append((np.eye(3), np.zeros(3)) if moves[b] else placed[b])
     moving = np.flatnonzero(moves)
     new_index = np.append(np.cumsum(moves) - 1, -1)  # the last one is that of the world, -1
-    of_joints = ("bodies", "motions", "dof_", "quaternions")
+    of_joints = ("bodies", "motions", "dof_")
     kept = {k: rows[moving] for k, rows in m._asdict().items() if not k.startswith(of_joints)}
     parts = m._replace(**kept)._replace(
         bodies=len(moving),

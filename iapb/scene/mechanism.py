@@ -27,7 +27,7 @@ from iapb.mechanics.structure import carriers
 from iapb.numerics.linalg import product
 from iapb.numerics.schema import Booleans, Floats, Indices, Integers
 from iapb.scene.bodies import WORLD, in_space, inertia_matrix
-from iapb.scene.model import Scene, SpatialScene
+from iapb.scene.model import Scene
 from iapb.scene.parts import SMALLEST_POSITIVE
 
 Pairs = Indices
@@ -222,7 +222,7 @@ def shapes_of(scene: Scene) -> Shapes:
             made.append(_placed(shape, -1, rotation, shift))
         else:
             made.append(_placed(shape, body, np.eye(3), np.zeros(3)))
-    return make_shapes(made, isinstance(scene, SpatialScene))
+    return make_shapes(made)
 
 
 def _placed(shape: Any, body: int, rotation: Floats, shift: Floats) -> geometry.Shape:

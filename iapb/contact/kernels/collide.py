@@ -130,7 +130,7 @@ def apply_group(state, size, share):
 
 
 @kernel
-def resolve_unequal(world, state, size, count, smallest, tolerance):
+def resolve_unequal(state, size, count, smallest, tolerance):
     """Apply Poisson's law to rows of unequal e; if it fails, the scalar rule with the smallest e,
     which is passive."""
     work = state.work
@@ -228,7 +228,7 @@ def push_with_friction(world, state, size, count, smallest, tolerance):
     work = state.work
     f = state.friction_work
     together = count
-    rank, clamp, solved = resolve_unequal(world, state, size, count, smallest, tolerance)
+    rank, clamp, solved = resolve_unequal(state, size, count, smallest, tolerance)
     if solved:
         together = keep_together(state, size, count)
         rank = orthonormal_basis(size, together, tolerance, size, work)
@@ -270,7 +270,7 @@ def resolve_rows(world, state, size, count):
     ):
         return push_with_friction(world, state, size, count, e, tolerance)
     if unequal:
-        rank, clamp, solved = resolve_unequal(world, state, size, count, e, tolerance)
+        rank, clamp, solved = resolve_unequal(state, size, count, e, tolerance)
     else:
         rank, clamp = factored_impact(size, count, e, tolerance, size, True, work)
     if world.switches.impact_friction:

@@ -245,9 +245,8 @@ def refine_change(d, rank, work):
     deviation = work.deviation[:d]
     inside = work.along[:d]
     shifted = work.shifted[:d]
-    for k in range(d):
-        shifted[k] = change[k]
-        inside[k] = 0.0
+    copy_into(shifted, change)
+    inside[:] = 0.0
     size = dot_of(change, change)
     lower = work.lower
     for _ in range(_PASSES):

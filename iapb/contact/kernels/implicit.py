@@ -226,7 +226,7 @@ def bends_too_far(world, state, size, count, s):
     if not bends:
         return False
     after = 0.5 * mass_form(world, state, size, work.v, work.v)
-    before = free_energy(world, state, size) + spring_energy(world, state, count, s, 0.0)
+    before = free_energy(world, state, size) + spring_energy(state, count, s, 0.0)
     return after > (1.0 + BENT) * before
 
 
@@ -425,7 +425,7 @@ def speed_at(work, j, share):
 
 
 @kernel
-def push(world, state, r, s, k, share):
+def push(state, r, s, k, share):
     """Return the normal impulse Δt f of contact r at `share` of the present step."""
     work = state.rest_work
     gap = state.contacts.gap[work.contact[r]]
@@ -444,12 +444,12 @@ def slide_speed(work, r, s, share):
 
 
 @kernel
-def set_impulses(world, state, count, s, k, share):
+def set_impulses(state, count, s, k, share):
     """Write the impulses of the speeds at `share` of the present step."""
     work = state.rest_work
     for r in range(count):
         n = r * s
-        work.p[n] = push(world, state, r, s, k, share)
+        work.p[n] = push(state, r, s, k, share)
         if s > 1:
             grip = work.limit[r] / slide_speed(work, r, s, share)
             for j in range(n + 1, n + s):
@@ -462,7 +462,7 @@ def slope(world, state, size, count, s, k, share, linear, quadratic):
     function along it."""
     work = state.rest_work
     total = linear + share * quadratic
-    set_impulses(world, state, count, s, k, share)
+    set_impulses(state, count, s, k, share)
     for j in range(count * s):
         total -= work.p[j] * work.change[j]
     for i in range(size if world.switches.joint_friction else 0):
@@ -482,7 +482,7 @@ def open_balance(world, state, size, count, s, k):
     along_rows(work, count, s, work.v, work.speed)
     write_difference(work.change_of_v[:size], work.v, work.free)
     times_mass(world, state, size, work.change_of_v, work.balance)
-    set_impulses(world, state, count, s, k, 0.0)
+    set_impulses(state, count, s, k, 0.0)
     for r in range(count):
         for j in range(r * s, (r + 1) * s):
             if work.p[j] != 0.0:
@@ -633,7 +633,7 @@ def solve(world, state, size, count, s, k):
         along_rows(work, count, s, step, work.change)
         if is_quadratic(world, state, size, count, s, k):  # the step is exact
             add_multiple(v, 1.0, step)
-            set_impulses(world, state, count, s, k, 1.0)
+            set_impulses(state, count, s, k, 1.0)
             add_multiple(work.speed[: count * s], 1.0, work.change)
             return True
         share = line_search(world, state, size, count, s, k)
@@ -659,7 +659,7 @@ def is_quadratic(world, state, size, count, s, k):
             return False
     for r in range(count):
         j = r * s
-        if (work.p[j] > 0.0) != (push(world, state, r, s, k, 1.0) > 0.0):
+        if (work.p[j] > 0.0) != (push(state, r, s, k, 1.0) > 0.0):
             return False
         if (
             work.limit[r] > 0.0
@@ -721,7 +721,7 @@ def follow_limits(world, state, count, s, share):
 
 
 @kernel
-def spring_energy(world, state, count, s, share):
+def spring_energy(state, count, s, share):
     """Return Φ [J] at the gaps that the velocity `share` v would lead to."""
     work = state.rest_work
     total = 0.0
@@ -738,13 +738,8 @@ def guard(world, state, size, count, s):
     work = state.rest_work
     share = 1.0
     after = 0.5 * mass_form(world, state, size, work.v, work.v)
-    allowed = (free_energy(world, state, size) + spring_energy(world, state, count, s, 0.0)) * (
-        1.0 + GAIN
-    )
-    while (
-        share > 0.0
-        and after * share * share + spring_energy(world, state, count, s, share) > allowed
-    ):
+    allowed = (free_energy(world, state, size) + spring_energy(state, count, s, 0.0)) * (1.0 + GAIN)
+    while share > 0.0 and after * share * share + spring_energy(state, count, s, share) > allowed:
         share = 0.5 * share if share > 1e-3 else 0.0
     if share < 1.0:
         work.shortened[0] += 1

@@ -37,7 +37,6 @@ class MechanismArrays(NamedTuple):
     dof_leader: Integers  # (m,) the velocity that it follows, its own or another one
     dof_ratio: Floats  # (m,) 1 for its own
     dof_offset: Floats  # (m,)
-    quaternions: bool  # whether a joint has one
 
 
 class Workspace(NamedTuple):

@@ -216,6 +216,6 @@ def test_what_falls_through_a_gap_too_narrow_for_it_is_seen(
 
 
 def test_a_ball_crosses_a_smaller_one_within_its_own_radius() -> None:
-    (small,) = solids_of(make_shapes([Shape(SPHERE, radius=0.005)], True)).values()
+    (small,) = solids_of(make_shapes([Shape(SPHERE, radius=0.005)])).values()
     start = np.array([[0.0, 0.03, 0.1]])
     assert small.crossed(start, start * [1, 1, -1], np.zeros(1), 0.04).all()
