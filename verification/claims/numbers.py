@@ -17,7 +17,7 @@ from verification.claims import peg, walls
 from verification.claims.conditions import TILTS, Condition
 from verification.data import data_of
 from verification.finding import DECIDING, REFUTED, WHERE, Failure, Finding, attempt
-from verification.numbers import Values, quoted, value_tables
+from verification.numbers import Values, quote, quoted, value_tables
 from verification.table import Table, table_from
 
 MILLI = 1e3
@@ -76,16 +76,6 @@ def _limits(claims: Claims) -> dict[str, Any]:
         "C10 tilt limit deg": degrees(min(ends)) if len(ends) == 2 else None,
         "C10 fails": sum(parts[name].verdict == REFUTED for name in ("x", "y", "rotation")),
     }
-
-
-def _median(rows: Table, key: str) -> float | None:
-    return float(np.median(rows[key])) if rows.rows else None
-
-
-def _median_mm(rows: Table, key: str) -> float | None:
-    """Return the median of a length [mm]."""
-    median = _median(rows, key)
-    return None if median is None else MILLI * median
 
 
 def _bouncing(table: Table) -> Values:
@@ -169,8 +159,8 @@ def _by_threshold(table: Table) -> Iterator[dict[str, Any]]:
         rests = settles.get(speed, rows.only(()))
         yield value | {
             "measured": "median time to rest [s]",
-            "IAPB": _median(rests, "IAPB"),
-            "spring": _median(rests, "PB"),
+            "IAPB": quote(rests, "median", "IAPB"),
+            "spring": quote(rests, "median", "PB"),
         }
 
 
@@ -184,9 +174,9 @@ def _by_tilt(table: Table) -> Iterator[dict[str, Any]]:
                 "value": degrees(tilt),
                 "unit": "°",
                 "measured": "median distance from the rigid wall [mm]",
-                "IAPB": _median_mm(rows, "IAPB"),
-                "spring": _median_mm(rows, "PB"),
-                "IAPB, pushing only": _median_mm(rows, peg.PUSHING),
+                "IAPB": quote(rows, "median", "IAPB", times=MILLI),
+                "spring": quote(rows, "median", "PB", times=MILLI),
+                "IAPB, pushing only": quote(rows, "median", peg.PUSHING, times=MILLI),
             }
 
 

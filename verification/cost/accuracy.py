@@ -24,8 +24,10 @@ from verification.check import Check, Study
 from verification.clock import sampler, take_turns, timed
 from verification.cost import calls
 from verification.cost.calls import PRINTED, Call
+from verification.data import data_of
 from verification.finding import Failure, attempt, counted
 from verification.impacts import TIMED_HARDNESS, ImpactCase, timed_problem
+from verification.numbers import Values, quoted
 from verification.table import Columns, Row, Table, table_from
 
 COMPILED = "compiled"
@@ -399,20 +401,7 @@ def called_in(key: str) -> bool:
     return COMPILED in key or PYTHON in key
 
 
-def numbers_of(best: Table) -> Row:
+def numbers_of(best: Table) -> Values:
     """Return what the page quotes of `recommended`: IAPB's share, its times, and its errors."""
-    rows = best.records()
-    ours = [row for row in rows if row[f"method, {COMPILED}"] == IAPB]
-    if not ours:
-        return {"sizes": len(rows), "sizes_iapb": 0}
-    first = ours[0]
-    last = ours[-1]
-    return {
-        "sizes": len(rows),
-        "sizes_iapb": len(ours),
-        "smallest_contacts": first["contacts"],
-        "smallest_us": first[f"time, {COMPILED}"],
-        "largest_contacts": last["contacts"],
-        "largest_us": last[f"time, {COMPILED}"],
-        "largest_error": max(row[f"largest error, {COMPILED}"] for row in ours),
-    }
+    key = "recommended"
+    return quoted({key: data_of(__file__, "numbers.yaml")[key]}, {key: best})

@@ -202,7 +202,7 @@ def steps_table(rows: Iterable[Row]) -> Table:
 def numbers_of(times: Table) -> Row:
     """Return the main numbers of the page: effects that are on, and the time that the others
     save."""
-    found = quoted(QUOTES, {STEPS: times})
+    found = quoted({STEPS: QUOTES[STEPS]}, {STEPS: times})
     return {
         **found,
         "saves": found["saved_median"] > found["noise_median"],
