@@ -46,9 +46,9 @@ def test_a_motion_that_is_off_is_off_by_as_much(judge: study.Judge, true_run: Ru
     assert errors["position"] == pytest.approx(0.03 / LENGTH)
     assert note == ""
     made = judge.kinetic * (true_run.time > 0.0)
-    energy = {"kinetic": made, "potential": made}
+    energy = true_run.energy | {"kinetic": made, "potential": made}
     errors, _ = judge.errors(replace(true_run, energy=energy))
-    assert errors["energy made"] == 2.0
+    assert errors["energy made"] == pytest.approx(2.0)
 
 
 def test_a_turn_about_the_center_is_an_error_of_the_point_beside_it(
