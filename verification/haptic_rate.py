@@ -185,33 +185,23 @@ RATIOS = Check(
     targets=ratio_targets,
     columns=Columns(timed=TIMED, timed_rows=True),
 )
-BENCH = Topic(
+TOPIC = Topic(
     key="haptic-rate",
     title="Speed",
     question="What does accuracy cost, and is it fast enough?",
     checks=(
         steps.RACES,
-        replace(C19, targets=growth_targets),
-        replace(C22, targets=lambda _: ()),
         steps.BODIES,
         robots.ROBOTS,
         replace(MOTIONS, targets=motion_targets),
         WORTH,
-        EACH,
-        RATIOS,
     ),
-    numbers=lambda _: {},
-    times=_times,
 )
 # What a report takes from the claims, and what follows from it.
-CLAIMED = (C19.key, C22.key)
+CLAIMED = (replace(C19, targets=growth_targets), replace(C22, targets=lambda _: ()))
 DERIVED = (EACH, RATIOS)
-_LATER = (*CLAIMED, *(check.key for check in DERIVED))
-TOPIC = replace(
-    BENCH,
-    checks=tuple(check for check in BENCH.checks if check.key not in _LATER),
-    times=None,
-    numbers=None,
+BENCH = replace(
+    TOPIC, checks=(*TOPIC.checks, *CLAIMED, *DERIVED), numbers=lambda _: {}, times=_times
 )
 
 
@@ -222,15 +212,12 @@ def quoting(found: Finding, others: Iterable[Finding]) -> Finding:
     """
     if not found.tables:
         return found
-    given = {key: other.tables[key] for other in others for key in CLAIMED if key in other.tables}
-    tables = {
-        check.key: found.tables[check.key] for check in TOPIC.checks if check.key in found.tables
-    }
-    missing = [Part("", NOT_COMPUTED, key, timed=True) for key in CLAIMED if key not in given]
+    keys = [claim.key for claim in CLAIMED]
+    given = {key: other.tables[key] for other in others for key in keys if key in other.tables}
+    missing = [Part("", NOT_COMPUTED, key, timed=True) for key in keys if key not in given]
     if missing:
-        return TOPIC.conclude(tables, found.failures, missing)
-    tables |= given
+        return TOPIC.conclude(found.tables, found.failures, missing)
+    tables = {**found.tables, **given}
     study = Study(results={("table", key): table for key, table in tables.items()})
-    return BENCH.conclude(
-        tables | {check.key: study.table(check) for check in DERIVED}, found.failures
-    )
+    tables |= {check.key: study.table(check) for check in DERIVED}
+    return BENCH.conclude(tables, found.failures)

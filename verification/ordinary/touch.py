@@ -22,7 +22,7 @@ from reference import Floats
 from reference.worlds import run_world
 from verification.check import Check, Study, no_row_fails
 from verification.data import data_of
-from verification.ordinary.judge import THEIRS, WORLDS, is_installed
+from verification.ordinary.judge import THEIRS, WORLDS
 from verification.table import Row
 
 G = 9.81
@@ -216,7 +216,7 @@ def _rows(study: Study, name: str) -> Iterator[Row]:
         }
         for rule in RULES:
             row[f"error, impacts at the {rule}"] = _median(found, step, rule)
-        if is_installed(THEIRS):
+        if THEIRS in WORLDS:
             row[f"error of {THEIRS}"] = _median(found, step, RULES[0], WORLDS[THEIRS])
         yield row
 
