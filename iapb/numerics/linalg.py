@@ -326,16 +326,6 @@ def solve_mass(lower, force, acceleration):
         acceleration[k] = total * (1.0 / lower[k, k])
 
 
-@kernel
-def solve_tree_blocks(lower, start, stop, force, acceleration):
-    """Do `solve_mass` for a block diagonal M, tree by tree: linear in the number of trees, with the
-    same bits."""
-    for t in range(len(start)):
-        i = start[t]
-        j = stop[t]
-        solve_mass(lower[i:j, i:j], force[i:j], acceleration[i:j])
-
-
 # Small dense matrices, called from Python
 
 

@@ -98,9 +98,9 @@ def cluster(world, contacts, count):
 
 
 @kernel
-def mark_new(contacts, count, previous, previous_count, distance, rigid):
+def mark_new(world, contacts, count, previous, previous_count):
     """Write is_new from temporal coherence: by position, or by shapes and feature alone if
-    `distance` is 0.
+    `coherence_distance` is 0.
 
     A contact is old if the step before had a contact (overlap beyond TOUCHING) with the same shapes
     and feature, or one within `distance` [m] on the same surface. The distance must exceed (largest
@@ -113,12 +113,13 @@ def mark_new(contacts, count, previous, previous_count, distance, rigid):
     Contacts keep their order from step to step, so the search begins after the last match. The cost
     is linear in the contacts that last.
     """
+    distance = world.coherence_distance
     begin = 0
     for i in range(count):
         contacts.is_new[i] = True
         for k in range(previous_count):
             j = wrapped(begin + k, previous_count)
-            acted = previous.gap[j] < -TOUCHING or rigid and previous.normal_force[j] > 0.0
+            acted = previous.gap[j] < -TOUCHING or world.rigid and previous.normal_force[j] > 0.0
             if acted and (
                 same_name(contacts, i, previous, j)
                 or (

@@ -69,7 +69,7 @@ def present_contacts(world, state, contacts, before, count_before):
     count = detect_contacts(world, state, contacts, before, count_before)
     if count >= 0:
         contact_velocities(world, state, contacts, count)
-        mark_new(contacts, count, before, count_before, world.coherence_distance, world.rigid)
+        mark_new(world, contacts, count, before, count_before)
         contacts.idle[:count] = False
         contacts.moved[:count] = False
         contacts.lift[:count] = 0.0

@@ -43,7 +43,6 @@ from iapb.numerics.linalg import (
     equal,
     scale,
     solve_mass,
-    solve_tree_blocks,
     store,
     subtract,
 )
@@ -84,6 +83,15 @@ def locate(world, state):
     return (
         cholesky_tree_blocks(state.mass_matrix, world.tree_start, world.tree_stop, state.lower) == 0
     )
+
+
+@kernel
+def divide_by_mass(world, state, vector):
+    """Do vector <- M⁻¹ vector, tree by tree, for M is block diagonal: linear in their number."""
+    for t in range(world.trees):
+        i = world.tree_start[t]
+        j = world.tree_stop[t]
+        solve_mass(state.lower[i:j, i:j], vector[i:j], vector[i:j])
 
 
 @kernel
@@ -154,9 +162,7 @@ def coriolis(world, state):
     bias(world.mechanism, state.body, state.v, state.bias)
     for k in range(len(state.v)):
         state.acceleration[k] = -state.bias[k]
-    solve_tree_blocks(
-        state.lower, world.tree_start, world.tree_stop, state.acceleration, state.acceleration
-    )
+    divide_by_mass(world, state, state.acceleration)
 
 
 @kernel
@@ -271,7 +277,7 @@ def pull_falling_trees(world, state, applied):
         return
     place_bodies(world, state)
     gravity(world.mechanism, state.body, world.gravity, state.bias)
-    solve_tree_blocks(state.lower, world.tree_start, world.tree_stop, state.bias, state.bias)
+    divide_by_mass(world, state, state.bias)
     add_to_falling_trees(world, state, applied, state.v, -0.5 * state.h[0])
 
 
@@ -347,4 +353,4 @@ def accelerate(world, state, applied):
     if world.switches.velocity_terms and not world.conserving:
         bias(world.mechanism, state.body, state.v, state.bias)
         add_multiple(a, -1.0, state.bias)
-    solve_tree_blocks(state.lower, world.tree_start, world.tree_stop, a, a)
+    divide_by_mass(world, state, a)

@@ -446,14 +446,7 @@ def overlap_now(world, state, a, b):
 def velocities_and_marks(world, state, count):
     """Complete the contacts of `arriving`: their velocities, and whether they are new."""
     contact_velocities(world, state, state.arriving, count)
-    mark_new(
-        state.arriving,
-        count,
-        state.contacts,
-        state.contact_count[0],
-        world.coherence_distance,
-        world.rigid,
-    )
+    mark_new(world, state.arriving, count, state.contacts, state.contact_count[0])
 
 
 @kernel
