@@ -18,14 +18,14 @@ import numpy as np
 from iapb.contact.kernels.broadphase import near_pairs
 from iapb.loop import make_record
 from iapb.recording import Recorder
-from iapb.scene import scene_from_text
+from iapb.scene import Scene, load_scene
 from iapb.scene.mechanism import start_of
 from iapb.simulation import Simulation
 from reference.mujoco import MuJoCo, joint_places, set_state
 from verification.check import Check, Study
 from verification.clock import take_turns, timed
 from verification.cost.growth import power_law
-from verification.cost.resting import RESTING, RestingScene
+from verification.cost.resting import FOLDER, RESTING, RestingScene
 from verification.finding import Part
 from verification.table import Columns, Row, Table
 
@@ -189,9 +189,7 @@ RACES = Check(
 
 COUNTS = (1, 2, 5, 10, 20, 50, 100, 200)
 LEAST_BODIES = 20  # with fewer, overhead hides the growth
-# [m]: discs on a square grid with 6 mm between them
-RADIUS = 0.02
-PITCH = 0.046
+PITCH = 0.046  # [m]: discs on a square grid with 6 mm between them
 # short chunks, so that each chunk has an undisturbed repeat
 CHUNKS = 50
 CHUNK_STEPS = 10
@@ -199,36 +197,28 @@ REPEATS = 3
 LARGEST_POWER = 1.2  # target
 
 
-def field_of_discs(n: int) -> str:
-    """Return the YAML text of a scene of n discs with random velocities over a wall."""
+def field_of_discs(n: int) -> Scene:
+    """Return a scene of n discs with random velocities over a wall."""
+    scene = load_scene(FOLDER / "field_of_discs.yaml")
+    (disc,) = scene.resolved()["bodies"]
     rng = np.random.default_rng(0)
     columns = math.ceil(math.sqrt(n))
     bodies = [
-        f"  - {{name: disc_{k}, joint: planar, mass: 0.1, inertia: 2e-5, "
-        f"shapes: [{{kind: circle, radius: {RADIUS}}}], "
-        f"position: [{PITCH * (k % columns):.6f}, {PITCH * (k // columns):.6f}, 0], "
-        f"velocity: [{0.3 * rng.normal():.6f}, {0.3 * rng.normal():.6f}, 0]}}"
+        disc
+        | {
+            "name": f"disc_{k}",
+            "position": [PITCH * (k % columns), PITCH * (k // columns), 0.0],
+            "velocity": [*(0.3 * rng.normal(size=2)).tolist(), 0.0],
+        }
         for k in range(n)
     ]
-    return "\n".join(
-        [
-            "name: field_of_discs",
-            "rate: 1000",
-            "duration: 1",
-            "bodies:",
-            *bodies,
-            "walls:",
-            "  - {name: wall, kind: half_plane, point: [0, -0.03], normal: [0, 1]}",
-            "contact: {forces: paper, stiffness: 500, damping: 1, restitution: 0.5, coherence_distance: 1e-3}",
-            "",
-        ]
-    )
+    return scene.with_values({"bodies": bodies})
 
 
 def step_of_bodies(study: Study, n: int) -> Row:
     """Time the same steps several times; each chunk counts with its least time, as other processes
     only add time."""
-    simulation = Simulation(scene_from_text(field_of_discs(n)))
+    simulation = Simulation(field_of_discs(n))
     simulation.rewind()
     quickest = [math.inf] * CHUNKS
     for _ in range(REPEATS):

@@ -12,7 +12,6 @@ import pytest
 from iapb.contact import finding
 from iapb.contact.finding import ContactFinder
 from iapb.contact.kernels import broadphase
-from iapb.scene import scene_from_text
 from iapb.scene.reading import scene_from_values
 from iapb.simulation import simulate
 from iapb.system import System
@@ -260,7 +259,7 @@ def test_many_shapes_are_found_without_asking_all_pairs(forces: str, monkeypatch
     held = {"name": "disc_0", "joint": "fixed", "shapes": [{"kind": "circle", "radius": 0.02}]}
     contact = {"forces": forces} | ({"stiffness": 500} if forces == "paper" else {})
     values = {"duration": 0.2, "bodies.0": held, "contact": contact}
-    scene = scene_from_text(field_of_discs(40)).with_values(values)
+    scene = field_of_discs(40).with_values(values)
     run = simulate(scene)
     monkeypatch.setattr(broadphase, "WORTHWHILE_PAIRS", 10**9)
     alone = simulate(scene.with_values({"title": "all pairs"}))
