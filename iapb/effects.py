@@ -304,7 +304,7 @@ EFFECTS: dict[str, Rule] = {
     # (1): gravity G, mass matrix M(q), Coriolis and centripetal forces B, force of the hand J_h^T
     # F_h
     "gravity": Rule(
-        lambda q: f"gravity is on: gravity = {numbers(q.scene.gravity)} m/s2",
+        lambda q: f"the scene gives gravity = {numbers(q.scene.gravity)} m/s2",
         lambda q: f"{', '.join(q.sinking) or 'bodies'} would not fall or sag",
         _weightless,
     ),

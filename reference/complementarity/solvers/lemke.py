@@ -53,11 +53,12 @@ def solve(problem: ImpactProblem) -> Answer:
         note = f"{_STATUS.get(result.status, result.status)} after {result.num_iter} pivots"
         z = _solved_again(w, b, result.z)
         wrong = float(np.abs(np.minimum(z, w @ z + b)).max(initial=0.0))
-        if result.success and wrong < least:
+        # the contacts that push at the start of a ray can be those of a solution
+        if wrong < least and (result.success or wrong <= _SOLVED):
             best = Answer(z * speed / inertia, note)
             least = wrong
-        if least <= _SOLVED:
-            return best
+        if result.success and wrong <= _SOLVED:
+            break
     return best if best.impulse is not None else Answer(None, note)
 
 

@@ -271,6 +271,15 @@ def test_clarabel_answers_at_a_coarser_accuracy_where_it_has_none_at_its_finest(
     assert solution.residuals.worst <= 1e-6
 
 
+def test_lemke_answers_where_its_pivots_end_on_a_ray() -> None:
+    """Nearly parallel and exactly opposed rows; the contacts that push on the ray are the
+    solution's."""
+    mass = [[1.0, 0.00820634], [0.00820634, 0.00016628]]
+    rows = [[-0.72, -0.7], [0.73, 0.68], [-0.73, -0.68]]
+    problem = ImpactProblem.from_impact(mass, rows, [-1.0, 117.0], 1.0)
+    assert solve(problem, "lemke").residuals.worst <= 1e-9
+
+
 @pytest.mark.parametrize(
     ("impulse", "expected"),
     [
