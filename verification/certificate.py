@@ -36,6 +36,7 @@ EXPORT_HEAD = "iapb impacts 2"  # first line of a file of exported impacts
 _CHECKED = 100  # integers confirm one in so many of the impacts that the bound decides
 _EPSILON = np.finfo(float).eps
 _BATCH = 4096  # impacts whose mass matrices are in memory at once
+_PIECE = 1 << 18  # coordinates and contacts, on average, of the steps that are in memory at once
 _INDEFINITE = (
     1e-12  # a negative eigenvalue of M beyond this share of the largest one is no rounding
 )
@@ -239,20 +240,17 @@ def certify(run: Run) -> Certificate:
     IapbError
         The digest of the recomputed M differs from the recorded one.
     """
-    record = _record(run)
-    impacts = record.impacts
-    step = impacts.step
-    if len(step) and not (step.min() >= 0 and step.max() < len(record.impulse)):
-        expected = f"steps from 0 to {len(record.impulse) - 1}"
-        raise ArgumentError("impacts.step", step.max(), expected)
-    if (np.diff(step) < 0).any():
-        raise ArgumentError("impacts.step", step, "steps that never fall")
-    total = _total(record)
-    span, restitution = _contacts(record)
-    every_row = bool(np.all(impacts.rank >= impacts.rows))  # else some depend on others
+    _refuse_places(run)
+    silent = run.law not in ENGINE_LAWS and not any(
+        piece.contacts.impulse.any() for piece in _pieces(run)
+    )  # another world may not record impulses of contacts
+    residuals = [(_total(piece), *_contacts(piece, silent)) for piece in _pieces(run)]
+    total, span, restitution = np.fmax.reduce(residuals).tolist()
+    # else some depend on others
+    every_row = bool(np.all(run.impacts.rank[:] >= run.impacts.rows[:]))
     judged = run.law == ImpulseAugmented().name and every_row and not np.isnan(restitution)
     return replace(
-        _certificate(_batches(record)),
+        _certificate(_batches(run)),
         span=span,
         restitution=restitution,
         total=total,
@@ -260,8 +258,25 @@ def certify(run: Run) -> Certificate:
     )
 
 
-class _Record(NamedTuple):
-    """What is certified of a run, in memory; the run may be in a file."""
+def _refuse_places(run: Run) -> None:
+    """Raise ArgumentError unless each impact and each contact is at a step of the run, in order."""
+    steps = len(run.impulse)
+    step = run.impacts.step[:]
+    if len(step) and not (step.min() >= 0 and step.max() < steps):
+        raise ArgumentError("impacts.step", step.max(), f"steps from 0 to {steps - 1}")
+    if (np.diff(step) < 0).any():
+        raise ArgumentError("impacts.step", step, "steps that never fall")
+    offsets = run.contacts.offsets[:]
+    rows = len(run.contacts.impulse)
+    fits = len(offsets) == steps + 1 and offsets[0] >= 0 and offsets[-1] <= rows
+    if not fits or (np.diff(offsets) < 0).any():
+        expected = f"{steps + 1} numbers of rows, from 0 to {rows}, that never fall"
+        raise ArgumentError("contacts.offsets", offsets, expected)
+
+
+class _Piece(NamedTuple):
+    """What is certified of some successive steps of a run, in memory; offsets and steps of impacts
+    count from the first of them."""
 
     run: Run
     impulse: Floats
@@ -269,20 +284,43 @@ class _Record(NamedTuple):
     impacts: ImpactTable
 
 
-def _record(run: Run) -> _Record:
-    contacts = ("offsets", "body_a", "body_b", "point", "normal", "impulse")
-    impacts = ("step", "q", "v_minus", "v_plus", "impulse", "rows", "rank", "scale", "mass_digest")
-    return _Record(run, run.impulse[:], _read(run.contacts, contacts), _read(run.impacts, impacts))
+def _pieces(run: Run) -> Iterator[_Piece]:
+    """Yield a run in pieces of limited memory; its arrays may be in a file."""
+    steps, d = run.impulse.shape
+    size = d + len(run.contacts.impulse) // max(steps, 1)  # of a step
+    few = max(_PIECE // max(size, 1), 1)
+    step = run.impacts.step[:]
+    for first in range(0, max(steps, 1), few):
+        impulse = run.impulse[first : first + few]
+        last = first + len(impulse)
+        offsets = run.contacts.offsets[first : last + 1]
+        begin, end = np.searchsorted(step, (first, last))
+        contacts = _read(
+            run.contacts,
+            ("body_a", "body_b", "point", "normal", "impulse"),
+            slice(offsets[0], offsets[-1]),
+        )
+        impacts = _read(
+            run.impacts,
+            ("q", "v_minus", "v_plus", "impulse", "rows", "scale"),
+            slice(begin, end),
+        )
+        yield _Piece(
+            run,
+            impulse,
+            replace(contacts, offsets=offsets - offsets[0]),
+            replace(impacts, step=step[begin:end] - first),
+        )
 
 
-def _read(table: Table, names: Sequence[str]) -> Table:
-    """Return a table with these columns in memory."""
-    return replace(table, **{name: getattr(table, name)[:] for name in names})
+def _read(table: Table, names: Sequence[str], rows: slice) -> Table:
+    """Return a table with these rows of these columns in memory."""
+    return replace(table, **{name: getattr(table, name)[rows] for name in names})
 
 
-def _total(record: _Record) -> float:
-    """Return `Certificate.total` of a record, whose numbers must be finite."""
-    (_, impulse, contacts, table) = record
+def _total(piece: _Piece) -> float:
+    """Return `Certificate.total` of a piece, whose numbers must be finite."""
+    (_, impulse, contacts, table) = piece
     sums = -impulse
     size = np.abs(impulse)
     for name in ("q", "v_minus", "v_plus", "impulse", "scale"):
@@ -295,11 +333,11 @@ def _total(record: _Record) -> float:
     return _largest_share(np.abs(sums).sum(axis=1), size.sum(axis=1))
 
 
-def _batches(record: _Record) -> Iterator[Batch]:
+def _batches(run: Run) -> Iterator[Batch]:
     """Yield M, v⁻, v⁺ and the generalized impulse of the recorded impacts in batches of
     `_BATCH`."""
-    scene = scene_from_values(record.run.scene_resolved)
-    table = record.impacts
+    scene = scene_from_values(run.scene_resolved)
+    table = run.impacts
     mechanism = mechanism_of(scene)
     begin = start_of(scene)[0]
     for start in range(0, len(table.step), _BATCH):
@@ -316,7 +354,7 @@ def _batches(record: _Record) -> Iterator[Batch]:
 
 def exported_run(run: Run) -> Iterator[str]:
     """Yield the impacts of a run as the lines of `exported`."""
-    for mass_matrix, v_minus, v_plus, _ in _batches(_record(run)):
+    for mass_matrix, v_minus, v_plus, _ in _batches(run):
         yield from exported(mass_matrix, v_minus, v_plus)
 
 
@@ -487,14 +525,12 @@ def _struck_at_once(impacts: ImpactTable, poisson: bool) -> _Struck:
     return _Struck(steps, chosen[first], chosen[last], whole)
 
 
-def _contacts(record: _Record) -> tuple[float, float]:
-    """Return `Certificate.span` and `Certificate.restitution`; NaN for one that the record cannot
+def _contacts(piece: _Piece, silent: bool) -> tuple[float, float]:
+    """Return `Certificate.span` and `Certificate.restitution` of a piece; NaN for one that it cannot
     decide."""
-    (run, impulse, table, impacts) = record
+    (run, impulse, table, impacts) = piece
     scene = scene_from_values(run.scene_resolved)
     rubbing = run.law_settings.get("friction_in_impacts") and scene.largest_friction > 0
-    # another world may not record impulses of contacts
-    silent = run.law not in ENGINE_LAWS and not table.impulse.any()
     steps, first, last, whole = _struck_at_once(impacts, scene.contact.forces == "implicit")
     per_body = scene.contact.self_collision_rows == "per_body"
     if silent or rubbing or per_body or not len(steps):

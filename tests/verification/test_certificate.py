@@ -25,7 +25,7 @@ from iapb import (
 from iapb.contact.laws import ImpulseAugmented
 from iapb.run import Run, digests
 from iapb.scene import scene_from_text
-from verification.certificate import exact_gain, judge_gains
+from verification.certificate import exact_gain, exported_run, judge_gains
 
 
 def near_the_border(
@@ -232,11 +232,80 @@ def test_what_is_forged_in_a_record_fails_in_its_residual(
 ) -> None:
     """Also if the impacts are judged in batches of a few."""
     monkeypatch.setattr(verification.certificate, "_BATCH", batch)
+    monkeypatch.setattr(verification.certificate, "_PIECE", batch * 64)
     forge, failing = FORGED[name]
     found = certify(forge(cradle))
     limits = {"gains": 0.0, "momentum": 1e-9, "span": 1e-9, "total": 1e-9, "restitution": 1e-6}
     assert {name for name, limit in limits.items() if getattr(found, name) > limit} == failing
     assert not found.passed and ("fit" in found.words()) == (failing != {"gains"})
+
+
+class Stored:
+    """An array as of a file, which can only be read in slices; it keeps the most rows that one read
+    takes."""
+
+    def __init__(self, array: np.ndarray) -> None:
+        self._array = array
+        self.shape = array.shape
+        self.most = 0
+
+    def __len__(self) -> int:
+        return len(self._array)
+
+    def __getitem__(self, rows: slice) -> np.ndarray:
+        found = self._array[rows]
+        self.most = max(self.most, len(found))
+        return found
+
+
+def stored(table: Any) -> Any:
+    return replace(
+        table, **{each.name: Stored(getattr(table, each.name)) for each in fields(table)}
+    )
+
+
+def test_a_long_run_is_certified_and_exported_in_pieces(
+    cradle: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Memory does not grow with what is recorded of contacts, impulses and velocities."""
+    lines = list(exported_run(cradle))
+    monkeypatch.setattr(verification.certificate, "_BATCH", 2)
+    whole = certify(cradle)
+    monkeypatch.setattr(verification.certificate, "_PIECE", 200)
+    run = replace(
+        cradle,
+        impulse=Stored(cradle.impulse),
+        contacts=stored(cradle.contacts),
+        impacts=stored(cradle.impacts),
+    )
+    assert list(exported_run(run)) == lines
+    assert max(getattr(run.contacts, each.name).most for each in fields(run.contacts)) == 0
+    assert certify(run) == whole
+    assert 0 < run.impulse.most < len(run.impulse) // 10
+    for name in ("body_a", "body_b", "point", "normal", "impulse"):
+        column = getattr(run.contacts, name)
+        assert 0 < column.most < len(column) // 4
+    for name in ("q", "v_minus", "v_plus", "impulse", "scale", "mass_digest"):
+        column = getattr(run.impacts, name)
+        assert 0 < column.most < len(column)
+
+
+@pytest.mark.parametrize(
+    "offsets",
+    [
+        lambda given: given[:-1],
+        lambda given: given[:0],
+        lambda given: given[::-1],
+        lambda given: given + 1,
+        lambda given: given - 1,
+    ],
+)
+def test_offsets_that_do_not_fit_the_steps_are_refused_in_a_sentence(
+    cradle: Run, offsets: Callable[[np.ndarray], np.ndarray]
+) -> None:
+    wrong = replace(cradle.contacts, offsets=offsets(cradle.contacts.offsets))
+    with pytest.raises(ArgumentError, match=r"contacts\.offsets.*that never fall"):
+        certify(replace(cradle, contacts=wrong))
 
 
 def test_restitution_is_judged_under_the_plain_law_alone(cradle: Run) -> None:
