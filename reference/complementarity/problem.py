@@ -60,20 +60,20 @@ class ImpactProblem:
         """Return the problem of an impact of velocity v (d,) on rows J (n, d) with mass matrix M
         (d, d).
 
-        The contact velocities of dependent rows are made consistent, and those that are rounding
-        are 0: opposed rows contradict each other in the rounding of J v, which is as large as |v|,
-        and no solver finds an answer then.
+        The contact velocities of dependent rows are made consistent, and are 0 if all of them are
+        rounding: opposed rows contradict each other in the rounding of J v, which is as large as
+        |v|, and no solver finds an answer then.
         """
         v = _array("velocity", velocity, (None,))
         mass = _array("mass_matrix", mass_matrix, (len(v), len(v)))
         jacobian = _array("contact_jacobian", contact_jacobian, (None, len(v)))
         factor = _mechanical_factor(mass, jacobian)
         contacts = _contacts(len(jacobian), contact_size, restitution, friction, relaxed, name)
-        gamma = _consistent(mass, factor, jacobian @ v)
-        rounding = len(v) * np.finfo(np.float64).eps * (np.abs(jacobian) @ np.abs(v))
+        # of v itself, and of the products
+        rounding = 2 * len(v) * np.finfo(np.float64).eps * (np.abs(jacobian) @ np.abs(v))
         return cls(
             factor @ factor.T,
-            np.where(np.abs(gamma) > rounding, gamma, 0.0),
+            _consistent(mass, factor, jacobian @ v, rounding),
             **contacts,
             mass_matrix=mass,
             contact_jacobian=jacobian,
@@ -216,9 +216,9 @@ def _contacts(
     return found
 
 
-def _consistent(mass: Floats, factor: Floats, gamma: Floats) -> Floats:
-    """Return the contact velocities (n,) nearest to `gamma` that some motion has on the rows of A;
-    `gamma` itself if the rows are independent.
+def _consistent(mass: Floats, factor: Floats, gamma: Floats, rounding: Floats) -> Floats:
+    """Return the contact velocities (n,) nearest to `gamma` that some motion has on the rows of A,
+    or 0 if all are rounding; `gamma` itself if the rows are independent.
 
     The triangular solve for A errs by n ε √κ(M): unit rows dependent to this are dependent.
     """
@@ -227,7 +227,9 @@ def _consistent(mass: Floats, factor: Floats, gamma: Floats) -> Floats:
     length[length == 0.0] = 1.0
     unit = factor / length[:, None]
     motion, _, rank, _ = np.linalg.lstsq(unit, gamma / length, rcond=float(dependent))
-    return gamma if rank == len(gamma) else np.asarray(length * (unit @ motion))
+    if rank == len(gamma):
+        return gamma
+    return np.asarray(length * (unit @ motion)) * (np.abs(gamma) > rounding).any()
 
 
 def _mechanical_factor(mass: Floats, jacobian: Floats) -> Floats:

@@ -42,6 +42,12 @@ def cases(count):
         gains = "four-channel" if scene.couplings.four_channel else "none"
         for law in (ImpulseAugmented(), ImpulseAugmented(pushing=True), Penalty("momentum")):
             yield name, struck, law, gains
+    falling = {"bodies.peg.position": [0.02, -0.0059, 0.0], "bodies.peg.velocity": [0.0, 0.1, 0.0]}
+    scene = load_scene(find_scene("peg_corner")).with_values(falling)
+    for e in (-1.0, -0.5):  # scene files have no negative e, claim C09 has
+        contact = scene.contact.model_copy(update={"restitution": e})
+        struck = scene.model_copy(update={"contact": contact})
+        yield f"peg that falls, e = {e}", struck, ImpulseAugmented(), "none"
     for seed in range(count):
         yield f"seed {seed}", *drawn(np.random.default_rng(seed))
 

@@ -25,7 +25,9 @@ from verification.laws.resolver import Resolver, ResolverFault, answer_of
 # messages: start a new worker; end
 FRESH = "fresh"
 LAST = "last"
-_CLOSED = 9  # exit status of a worker that ends the keeper, too
+# exit statuses of a worker that ends the keeper, too, and of one that makes room for a fresh one
+_CLOSED = 97
+_RESTART = 98
 
 
 class Child:
@@ -104,11 +106,16 @@ def _keep(resolver: Resolver, pipe: Connection, limit: float) -> None:
         status = os.waitstatus_to_exitcode(os.waitpid(worker, 0)[1])
         if status == _CLOSED:
             return
-        if status == -signal.SIGALRM:
-            pipe.send((ResolverFault(f"gave no answer within {limit:g} s"), ()))
-        elif status < 0:
-            name = signal.Signals(-status).name
-            pipe.send((ResolverFault(f"ended its process by {name}"), ()))
+        if status != _RESTART:
+            pipe.send((ResolverFault(_end_of_worker(status, limit)), ()))
+
+
+def _end_of_worker(status: int, limit: float) -> str:
+    """Return why a worker has ended in a call."""
+    if status == -signal.SIGALRM:
+        return f"gave no answer within {limit:g} s"
+    how = signal.Signals(-status).name if status < 0 else f"status {status}"
+    return f"ended its process by {how}"
 
 
 def _work(resolver: Resolver, pipe: Connection, limit: float) -> int:
@@ -119,7 +126,7 @@ def _work(resolver: Resolver, pipe: Connection, limit: float) -> int:
         except EOFError:
             return _CLOSED
         if given in (FRESH, LAST):
-            return 0 if given == FRESH else _CLOSED
+            return _RESTART if given == FRESH else _CLOSED
         signal.setitimer(signal.ITIMER_REAL, limit)
         answer = answer_of(resolver, given)
         signal.setitimer(signal.ITIMER_REAL, 0.0)

@@ -249,17 +249,18 @@ def resolve_rows(world, state, size, count):
     """Resolve by (20)-(21) or by the scene's extensions of them; return (rank, clamp, share of
     friction, solved)."""
     work = state.work
-    e = 1.0
-    largest = 0.0
+    e = restitution_of(world, state.contacts, state.rows[0])
+    largest = e
     solved = True
     friction_share = 1.0
     tolerance = rank_tolerance(work.lower[:size, :size])
-    for r in range(count):
-        own = restitution_of(world, state.contacts, state.rows[r])
-        state.row_restitution[r] = own
-        e = min(e, own)
-        largest = max(largest, own)
     pushing = world.switches.pushing or world.switches.implicit_contact and count > 1
+    if pushing or world.switches.unequal_restitution:
+        for r in range(count):
+            own = restitution_of(world, state.contacts, state.rows[r])
+            state.row_restitution[r] = own
+            e = min(e, own)
+            largest = max(largest, own)
     unequal = pushing or e < largest
     whiten_impact(size, count, unequal or world.switches.impact_friction, work)
     if (

@@ -38,6 +38,7 @@ class Switches(NamedTuple):
     varying_inertia: bool
     velocity_terms: bool
     impulses: bool
+    unequal_restitution: bool
     pushing: bool
     impact_friction: bool
     friction: bool  # of resting contacts

@@ -22,7 +22,7 @@ _PIVOTS = 100  # for each contact: quantecon's own limit of a million lets it cy
 # Attempts at a unit W, until one solves the problem: the least pivot, and what is added to the
 # diagonal. Nearly opposed contacts have small pivots; dependent ones have pivots of rounding; a W
 # without zero eigenvalues has no rays.
-_ATTEMPTS = ((1e-12, 0.0), (1e-9, 0.0), (1e-7, 0.0), (1e-7, 1e-12))
+_ATTEMPTS = ((1e-12, 0.0), (1e-9, 0.0), (1e-7, 0.0), (1e-12, 1e-12), (1e-7, 1e-12))
 _APART = 1e-14  # added to a unit b, so that opposed contacts do not tie
 _SOLVED = 1e-9  # of a unit b
 _STATUS = {0: "solution found", 1: "iteration limit", 2: "ray termination"}
@@ -52,6 +52,8 @@ def solve(problem: ImpactProblem) -> Answer:
         result = lcp_lemke(changed, b + apart, max_iter=most, piv_options=options)
         note = f"{_STATUS.get(result.status, result.status)} after {result.num_iter} pivots"
         z = _solved_again(w, b, result.z)
+        if problem.mass_matrix is not None:
+            z = _solved_by_rows(problem.factor / np.sqrt(inertia), b, z)
         wrong = float(np.abs(np.minimum(z, w @ z + b)).max(initial=0.0))
         # the contacts that push at the start of a ray can be those of a solution
         if wrong < least and (result.success or wrong <= _SOLVED):
@@ -69,3 +71,14 @@ def _solved_again(w: Floats, b: Floats, z: Floats) -> Floats:
     left = -b[push] - w[push] @ z
     refined[push] += np.linalg.lstsq(w[np.ix_(push, push)], left, rcond=1e-12)[0]
     return refined
+
+
+def _solved_by_rows(rows: Floats, b: Floats, z: Floats) -> Floats:
+    """Return z with Aᵀz = −y at the pushing contacts, if b = A y: it errs by κ(A), not by κ(W)."""
+    motion = np.linalg.lstsq(rows, b, rcond=None)[0]
+    if np.abs(rows @ motion - b).max(initial=0.0) > _SOLVED:
+        return z
+    push = np.flatnonzero(z > 0.0)
+    refined = np.zeros(len(z))
+    refined[push] = np.linalg.lstsq(rows[push].T, -motion, rcond=1e-12)[0]
+    return refined if (refined >= -_SOLVED * np.abs(refined).max(initial=0.0)).all() else z

@@ -4,6 +4,7 @@ names."""
 from __future__ import annotations
 
 import ctypes
+import os
 from collections.abc import Callable
 from itertools import count
 from typing import Any
@@ -60,7 +61,11 @@ def test_what_depends_on_earlier_calls_is_printed_with_them(make: Callable[[], A
 @pytest.mark.thorough
 @pytest.mark.parametrize(
     ("fault", "words"),
-    [(hangs, "gave no answer within 0.5 s"), (lambda *_: ctypes.string_at(0), "by SIGSEGV")],
+    [
+        (hangs, "gave no answer within 0.5 s"),
+        (lambda *_: ctypes.string_at(0), "by SIGSEGV"),
+        (lambda *_: os._exit(0), "by status 0"),
+    ],
 )
 def test_a_call_that_never_returns_is_ended(fault: Callable[..., Any], words: str) -> None:
     report = check_passivity(
