@@ -132,7 +132,10 @@ class Trajectory:
     @cached_property
     def displacements(self) -> Floats:
         """Displacement (n, d) of each step."""
-        moved: Floats = self.system.mechanism.displacements(self.run.q)
+        mechanism = self.system.mechanism
+        if mechanism.nq == mechanism.nv:  # without the kernel that is judged
+            return np.diff(self.run.q, axis=0)
+        moved: Floats = mechanism.displacements(self.run.q)
         return moved
 
 
@@ -230,9 +233,12 @@ def velocity_moves_configuration(trajectory: Trajectory) -> Found:
     if not trajectory.is_explained or trajectory.cut.any():
         return None
     run = trajectory.run
-    integrate = trajectory.system.mechanism.integrate
-    each = zip(run.q[:-1], run.v[1:], strict=True)
-    moved = np.array([integrate(q, v, run.dt) for q, v in each])
+    mechanism = trajectory.system.mechanism
+    if mechanism.nq == mechanism.nv:  # without the kernel that is judged
+        moved = run.q[:-1] + run.dt * run.v[1:]
+    else:
+        each = zip(run.q[:-1], run.v[1:], strict=True)
+        moved = np.array([mechanism.integrate(q, v, run.dt) for q, v in each])
     size = 1.0 + norm(run.q[1:]) + run.dt * norm(run.v[1:])
     return float(np.max(norm(moved - run.q[1:]) / size)), 16.0 * EPS
 
