@@ -38,7 +38,6 @@ from verification.check import Check, Study
 from verification.clock import timed
 from verification.cost.steps import IDEAL, RecordedLoop
 from verification.finding import attempt
-from verification.scenes.books import risen
 from verification.scenes.points import placed, points_of
 from verification.table import Columns, Row, Table
 
@@ -319,10 +318,12 @@ class Judge:
 
     def __init__(self, scene: Scene, length: float) -> None:
         self.length = length
+        self.gravity = np.array(scene.gravity or (0.0, 0.0, 0.0))
         self.mechanism = mechanism_of(scene)
         self.truth = scene_truth(scene, scene.duration)
         q, v = self.truth.state(np.linspace(0.0, scene.duration, 1001))
-        self.kinetic = float(self.mechanism.energies(q, v, np.zeros(3))[0].max())
+        self.kinetic = float(self.mechanism.energies(q, v, self.gravity)[0].max())
+        self.start = float(self._energy(q, v)[0])
         # the second point turns too
         self.bound = self.truth.bound.position * (1.0 + 0.5 * length) / length
 
@@ -332,9 +333,13 @@ class Judge:
         true_q, _ = self.truth.state(np.minimum(run.time[kept], self.truth.end))
         away = np.linalg.norm(self._points(run.q[kept]) - self._points(true_q), axis=-1)
         error = float(away.max()) / self.length
-        made = float(risen(run)[kept].max())  # at least that of the start, 0
-        found = {"position": max(error, self.bound), "energy made": made / self.kinetic}
+        made = float((self._energy(run.q[kept], run.v[kept]) - self.start).max())
+        found = {"position": max(error, self.bound), "energy made": max(0.0, made / self.kinetic)}
         return found, BELOW if error < self.bound else ""
+
+    def _energy(self, q: Floats, v: Floats) -> Floats:
+        kinetic, potential = self.mechanism.energies(q, v, self.gravity)
+        return kinetic + potential
 
     def _points(self, q: Floats) -> Floats:
         """Return the centre of each body and a point beside it (n, b, 2, 3) [m], in world axes."""

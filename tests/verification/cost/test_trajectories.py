@@ -45,10 +45,8 @@ def test_a_motion_that_is_off_is_off_by_as_much(judge: study.Judge, true_run: Ru
     errors, note = judge.errors(shifted)
     assert errors["position"] == pytest.approx(0.03 / LENGTH)
     assert note == ""
-    made = judge.kinetic * (true_run.time > 0.0)
-    energy = true_run.energy | {"kinetic": made, "potential": made}
-    errors, _ = judge.errors(replace(true_run, energy=energy))
-    assert errors["energy made"] == pytest.approx(2.0)
+    errors, _ = judge.errors(replace(true_run, v=1.1 * true_run.v))
+    assert errors["energy made"] > 0.1
 
 
 def test_a_turn_about_the_center_is_an_error_of_the_point_beside_it(
