@@ -318,6 +318,8 @@ class _Trial:
             for goal in search.goals:
                 for one in search.ranked(goal)[:1]:
                     self.judge("energy", one.motion)
+        if search.largest is not None:
+            self.judge("bounded", search.largest.motion)
 
     def searches(self, fastest: float | None, edge: bool) -> Iterator[None]:
         """Do the stages that search; raises NoForce."""
@@ -337,8 +339,6 @@ class _Trial:
             self.friction = max(self.friction, *(one.needed for one in most[1:]))
         for one in most:
             self.judge("energy", one.motion)
-        if search.largest is not None:
-            self.judge("bounded", search.largest.motion)
         yield
         if fastest is not None and not search.late:
             effort = SLOW_EFFORT * search.effort

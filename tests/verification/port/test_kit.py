@@ -72,6 +72,16 @@ def test_a_law_for_numbers_gives_no_force_in_the_plane_and_the_report_says_why()
     assert "x and v were arrays (2,)" in report and "raised ValueError" in report
 
 
+def test_a_search_that_ends_without_a_force_is_still_judged_on_the_largest_force():
+    def strong(x, v):
+        if abs(v) > 19.9995:
+            return np.nan
+        return -1000.0 * (x > 0.0) if abs(v) > 15.0 else wall(x, v)
+
+    report = check_force(strong, BareDevice(damping=0.5), limit=500.0, laws=["bounded"])
+    assert report.broken_laws == ("bounded",) and "no force" in report.unfinished
+
+
 @pytest.mark.thorough
 def test_every_planted_fault_is_found_and_its_test_fails_in_a_fresh_process(tmp_path):
     missed = []
