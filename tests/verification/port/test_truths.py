@@ -20,6 +20,7 @@ IMPLICIT = 1.0 + (B + K * T) * T / 0.1
 HESSIAN = np.array([[1500.0, 400.0], [400.0, 900.0]])
 CURL = np.array([[K, 300.0], [-300.0, K]])
 WALL = Linear(K, B)
+WITHOUT_FORCE = [(-1.0, 0.0), (-1.0, np.inf), (1.0, -np.inf), (1.0, -np.inf), (-1.0, -np.inf)]
 
 
 def clamped(x, v):
@@ -61,6 +62,14 @@ FRICTIONS = {  # law, resolution, damping, least friction
 def energy(law, device, **options):
     plane = np.ndim(getattr(law, "stiffness", 0.0))
     return check_force(law, device, start=[0.0, 0.0] if plane else 0.0, laws=["energy"], **options)
+
+
+@pytest.mark.parametrize("wall", [PenaltyWall(K, B), ImpulseWall(PenaltyWall(K, B))])
+def test_a_wall_pushes_with_nothing_outside_and_never_pulls_at_any_velocity(wall):
+    if isinstance(wall, ImpulseWall):
+        wall.reset(T)
+    assert [wall.step(*sample) for sample in WITHOUT_FORCE] == [0.0] * len(WITHOUT_FORCE)
+    assert wall.step(1.0, np.inf) == -np.inf
 
 
 @pytest.mark.parametrize("name", DAMPINGS)

@@ -8,8 +8,11 @@ jumps by (1 + e) m v / T.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from reference import Floats
 from verification.port.baselines.penalty import PenaltyWall
 
 
@@ -25,10 +28,10 @@ class ImpulseWall:
     def reset(self, dt: float) -> None:
         """Begin outside the wall."""
         self.gain = (1.0 + self.restitution) * self.mass / dt
-        self.inside: Any = False
+        self.inside: bool | NDArray[np.bool_] = False
 
-    def step(self, x: Any, v: Any) -> Any:
+    def step(self, x: float | Floats, v: float | Floats) -> Floats:
         """Return the force on the hand [N]."""
         new = (x > 0.0) > self.inside
         self.inside = x > 0.0
-        return new * -self.gain * (v > 0.0) * v + (1 - new) * self.penalty.step(x, v)
+        return np.where(new, -self.gain * np.maximum(v, 0.0), self.penalty.step(x, v))

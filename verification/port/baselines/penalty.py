@@ -7,17 +7,20 @@ application to haptic interfaces", Journal of Robotic Systems 14(1), 37-47, 1997
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+
+import numpy as np
+
+from reference import Floats
 
 
 @dataclass(frozen=True)
 class PenaltyWall:
     """F = −max(K x + B v, 0) inside the wall, x > 0 [m]; also of arrays."""
 
-    stiffness: Any
-    damping: Any = 0.0
+    stiffness: float | Floats
+    damping: float | Floats = 0.0
 
-    def step(self, x: Any, v: Any) -> Any:
+    def step(self, x: float | Floats, v: float | Floats) -> Floats:
         """Return the force on the hand [N]."""
-        push = self.stiffness * x + self.damping * v
-        return ((x > 0.0) & (push > 0.0)) * -push
+        push = np.maximum(self.stiffness * x + self.damping * v, 0.0)
+        return np.where(x > 0.0, -push, 0.0)
