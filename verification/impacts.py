@@ -632,7 +632,7 @@ def approaching(case: ImpactCase) -> ImpactCase:
     return replace(case, contact_jacobian=jacobian)
 
 
-def whole_numbers(family: Family, count: int, seed: int) -> Iterator[ImpactCase]:
+def integer_impacts(family: Family, count: int, seed: int) -> Iterator[ImpactCase]:
     """Yield impacts of integers (as doubles) with M = B Bᵀ + I, so that exact rationals stay
     short."""
     rng = np.random.default_rng([seed, *(round(number) for number in family), 1])

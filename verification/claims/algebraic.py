@@ -28,7 +28,7 @@ from verification.impacts import (
     ImpactCase,
     approaching,
     draw_of_rank,
-    whole_numbers,
+    integer_impacts,
 )
 from verification.methods import gram_cholesky, gram_pinv
 from verification.proofs.numbers import pseudo_inverse
@@ -98,7 +98,7 @@ def batches(
         errors, bound = parts[part]
         if bound is None:
             count = max(count // 4, LEAST_EXACT)
-        drawn = (draw if bound else whole_numbers)(family, count, study.seed)
+        drawn = (draw if bound else integer_impacts)(family, count, study.seed)
         batch = Batch(list(drawn), family, e, study.seed)
         found = finite(errors(batch))
         limit = bound(batch) if bound else 0.0

@@ -9,7 +9,7 @@ from fractions import Fraction
 import sympy
 from flint import fmpq_mat
 
-from verification.impacts import Family, whole_numbers
+from verification.impacts import Family, integer_impacts
 from verification.proofs import by_sympy, layout
 from verification.proofs.cases import (
     Case,
@@ -105,7 +105,7 @@ def random_case(number: int) -> Case:
     a fraction in [−1, 1]."""
     rank = 1 + number % LARGEST
     family = Family(min(rank + number % 2, LARGEST), rank + number % 3, rank, 1.0)
-    (impact,) = whole_numbers(family, 1, SEED + number)
+    (impact,) = integer_impacts(family, 1, SEED + number)
     mass = matrix_of(impact.mass_matrix.tolist())
     jacobian = matrix_of(impact.contact_jacobian.tolist())
     inverse = mass.inv()
