@@ -43,7 +43,7 @@ def impact_named(name: str) -> HardCase:
     given = written("impacts.yaml")[name]
     if "made by" in given:
         make = _called(vars(numerical), given["made by"])
-        numbers = make()
+        numbers = make()._asdict()
         exact = None
     else:
         arrays = {key: np.array(given[key], dtype=object) for key in "MJveT" if key in given}
@@ -51,7 +51,7 @@ def impact_named(name: str) -> HardCase:
         exact = rows if "/" in str(given["J"]) else None
         numbers = {key: _fractions(array).astype(float) for key, array in arrays.items()}
     mass = numbers["M"]
-    e = numbers["e"]
+    e = np.asarray(numbers["e"])
     arguments: dict[str, Any] = dict(
         **_texts(given),
         mass_matrix=np.diag(mass) if mass.ndim == 1 else mass,

@@ -188,9 +188,9 @@ class Answer(NamedTuple):
 def judge_impact(case: HardCase, method: str) -> Row:
     """Return the row of one method on one impact."""
     truth = case.truth
-    energy_bound = 10.0 * len(case.velocity) * EPS * float(np.sqrt(truth.condition))
-    forward_bound = allowed_error(case)
-    known = math.nan, energy_bound, math.nan, math.nan, forward_bound, math.nan
+    gain_allowed = 10.0 * len(case.velocity) * EPS * float(np.sqrt(truth.condition))
+    error_allowed = allowed_error(case)
+    known = math.nan, gain_allowed, math.nan, math.nan, error_allowed, math.nan
     if method in _FORM_DELASSUS and len(case.contact_jacobian) > MOST_CONTACTS:
         note = f"it forms the Delassus matrix; tried on at most {MOST_CONTACTS:,} contacts"
         return _row(method, NOT_TRIED, known, exact_rank=truth.rank, note=note)
@@ -205,9 +205,9 @@ def judge_impact(case: HardCase, method: str) -> Row:
         gain = relative_energy_gain(case.mass_matrix, case.velocity, v_plus)
         residual = _unmet(case, v_plus)
         distance = _forward_error(case, v_plus)
-        right = not case.well_posed or distance <= forward_bound
+        right = not case.well_posed or distance <= error_allowed
         return (
-            _verdict(gain <= energy_bound, residual <= RESTITUTION_TOLERANCE, right),
+            _verdict(gain <= gain_allowed, residual <= RESTITUTION_TOLERANCE, right),
             gain,
             residual,
             distance,
@@ -227,7 +227,7 @@ def judge_impact(case: HardCase, method: str) -> Row:
             smallest_fault(partial(is_seen, wrong))
             for wrong in faulty_answers(case, answer.velocity)
         )
-    numbers = gain, energy_bound, residual, distance, forward_bound, fault
+    numbers = gain, gain_allowed, residual, distance, error_allowed, fault
     return _row(method, verdict, numbers, answer.rank, truth.rank)
 
 

@@ -3,23 +3,30 @@ conditioning. Each function returns the numbers of a case of impacts.yaml."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
 from verification.impacts import Floats
 
-Numbers = dict[str, Any]  # M, J, v and e
+
+class Numbers(NamedTuple):
+    """The numbers of an impact."""
+
+    M: Floats  # (d, d), or its diagonal (d,)
+    J: Floats  # (c, d) normal rows
+    v: Floats  # (d,) velocity before
+    e: float
 
 
 def copies(count: int) -> Numbers:
     """One contact reported many times."""
-    return {
-        "M": np.array([[2.0, 0.3, 0.1], [0.3, 1.0, 0.2], [0.1, 0.2, 0.5]]),
-        "J": np.tile([0.6, 0.8, -0.25], (count, 1)),
-        "v": np.array([-1.0, -2.0, 0.5]),
-        "e": np.array(0.5),
-    }
+    return Numbers(
+        M=np.array([[2.0, 0.3, 0.1], [0.3, 1.0, 0.2], [0.1, 0.2, 0.5]]),
+        J=np.tile([0.6, 0.8, -0.25], (count, 1)),
+        v=np.array([-1.0, -2.0, 0.5]),
+        e=0.5,
+    )
 
 
 def integer_rows(count: int) -> Numbers:
@@ -28,12 +35,12 @@ def integer_rows(count: int) -> Numbers:
     rows = rng.integers(-2, 3, size=(count, 3)) @ np.array(
         [[1, 0, 2, -1], [0, 1, 1, 1], [1, 1, 0, 2]]
     )
-    return {
-        "M": np.array([1.0, 2.0, 3.0, 4.0]),
-        "J": rows.astype(float).reshape(count, 4),
-        "v": np.array([-1.0, -0.5, 0.25, 2.0]),
-        "e": np.array(0.5),
-    }
+    return Numbers(
+        M=np.array([1.0, 2.0, 3.0, 4.0]),
+        J=rows.astype(float).reshape(count, 4),
+        v=np.array([-1.0, -0.5, 0.25, 2.0]),
+        e=0.5,
+    )
 
 
 def rows_apart() -> Numbers:
@@ -45,7 +52,7 @@ def rows_apart() -> Numbers:
     rows = np.vstack(
         [base, base + 1e-4 * rng.normal(size=(2, d)), base + 1e-4 * rng.normal(size=(2, d))]
     )
-    return {"M": mass, "J": rows, "v": rng.normal(size=d), "e": np.array(1.0)}
+    return Numbers(M=mass, J=rows, v=rng.normal(size=d), e=1.0)
 
 
 def _mass(rng: np.random.Generator, d: int, decades: float) -> tuple[Floats, Floats]:
@@ -58,7 +65,7 @@ def _mass(rng: np.random.Generator, d: int, decades: float) -> tuple[Floats, Flo
 def hilbert_rows(n: int) -> Numbers:
     """The rows of the Hilbert matrix."""
     rows = 1.0 / (np.arange(n)[:, None] + np.arange(n) + 1.0)
-    return {"M": np.ones(n), "J": rows, "v": (-1.0) ** np.arange(1, n + 1), "e": np.array(0.5)}
+    return Numbers(M=np.ones(n), J=rows, v=(-1.0) ** np.arange(1, n + 1), e=0.5)
 
 
 def kahan_rows(n: int) -> Numbers:
@@ -66,7 +73,7 @@ def kahan_rows(n: int) -> Numbers:
     c = 0.6
     s = np.sqrt(1.0 - c * c)
     rows = s ** np.arange(n)[:, None] * (np.eye(n) - c * np.triu(np.ones((n, n)), 1))
-    return {"M": np.ones(n), "J": rows, "v": np.cos(np.arange(n)), "e": np.array(0.8)}
+    return Numbers(M=np.ones(n), J=rows, v=np.cos(np.arange(n)), e=0.8)
 
 
 def light_direction() -> Numbers:
@@ -76,4 +83,4 @@ def light_direction() -> Numbers:
     d = 6
     mass, axes = _mass(rng, d, 12.0)
     rows = rng.normal(size=(3, d)) @ np.linalg.cholesky(mass).T
-    return {"M": mass, "J": rows, "v": axes[:, -1], "e": np.array(1.0)}
+    return Numbers(M=mass, J=rows, v=axes[:, -1], e=1.0)
