@@ -37,6 +37,10 @@ _SIGNS = {
 _BETWEEN = re.compile(r"(?<=[\w)])\s*(?<!transpose)(?=\()|(?<=\))\s*(?=\w)|(?<=\w)\s+(?=\w)")
 
 
+_NUMBER = r"([\d\s()/+−·²³⁴]+)"
+_COMPARISON = re.compile(f"{_NUMBER}([=<≤>≥]){_NUMBER}")
+
+
 class Relation(NamedTuple):
     """value relation 0, where the relation is one of = ≠ ≥ ⪰ ≻, or "entries": every entry is ≥
     0."""
@@ -124,8 +128,11 @@ class Text:
 
     def compares(self, formula: str) -> bool:
         """Whether a comparison of numbers is true."""
-        left, sign, right = re.split(r"([=<≤>≥])", formula)
-        return Comparison(formula, self.read(left), sign, self.read(right)).is_true
+        parts = _COMPARISON.fullmatch(formula)
+        sides = [self.read(parts[side]) for side in (1, 3)] if parts else []
+        if not parts or not all(side.is_Rational for side in sides):
+            raise ArgumentError("numbers", formula, "a comparison of two numbers for SymPy")
+        return Comparison(formula, sides[0], parts[2], sides[1]).is_true
 
     def same(self, one: Any, other: Any) -> bool:
         """Whether the values are equal; a number may be transposed."""

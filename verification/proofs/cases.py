@@ -27,7 +27,8 @@ _RELATIONS = {
     ">": operator.gt,
     "≥": operator.ge,
 }
-_SIDES = re.compile(r"\s*([=<≤>≥])\s*")
+# a number is never the identity
+_COMPARISON = re.compile(r"([^=<≤>≥I]+)([=<≤>≥])([^=<≤>≥I]+)")
 _VALUE = re.compile(r"(\S+?)=(\[[^\]]*\]|\S+)")
 
 
@@ -45,8 +46,19 @@ class Comparison(NamedTuple):
 
 
 def read_comparison(says: str, formula: str) -> Comparison:
-    """Return a comparison of numbers, written as a formula without letters."""
-    left, relation, right = _SIDES.split(formula)
+    """Return a comparison of numbers, written as a formula without letters.
+
+    Raises
+    ------
+    ArgumentError
+        The formula is none.
+    """
+    parts = _COMPARISON.fullmatch(formula)
+    if parts is None:
+        raise ArgumentError(
+            "numbers", formula, "two sides without letters, and one of = < ≤ > ≥ between them"
+        )
+    left, relation, right = parts.groups()
     reader = Reader({})
     low, high = (value_of(reader.expression(side), {})[0, 0] for side in (left, right))
     return Comparison(says, low, relation, high)

@@ -165,12 +165,14 @@ BY_STATEMENT: dict[str, Callable[[], Compared]] = {
 
 
 def comparisons_of(block: layout.Block) -> Compared:
-    """Return the comparisons of a statement and the false ones."""
-    if block.name in BY_STATEMENT:
-        return BY_STATEMENT[block.name]()
-    shown = (read_comparison(entry.words, entry.formula) for entry in block.all("numbers"))
-    false = []
+    """Return the comparisons of a statement and the false ones: those that a program computes, and
+    those in its text."""
+    compute = BY_STATEMENT.get(block.name)
+    shown, false = compute() if compute else ((), ())
+    for entry in block.all("numbers"):
+        if entry.formula or not compute:
+            shown = (*shown, read_comparison(entry.words, entry.formula))
     for entry in block.all("false"):
         title, _, words = entry.words.partition(" :: ")
-        false.append((title, read_comparison(words, entry.formula), entry.note))
-    return tuple(shown), tuple(false)
+        false = (*false, (title, read_comparison(words, entry.formula), entry.note))
+    return shown, false

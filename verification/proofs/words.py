@@ -216,7 +216,7 @@ class Reader:
     def __init__(self, names: Mapping[str, Expression]) -> None:
         self.names = {"I": ONE, **names}
         words = "|".join(re.escape(name) for name in sorted(self.names, key=len, reverse=True))
-        self._token = re.compile(rf"\s*({words}|\d+(?:/\d+)?|\S)")
+        self._token = re.compile(rf"\s*({words}|\d+(?:/0*[1-9]\d*)?|\S)")
 
     def expression(self, text: str) -> Expression:
         """Return the value of a sum."""

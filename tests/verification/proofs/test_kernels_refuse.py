@@ -10,6 +10,7 @@ import pytest
 from iapb.errors import ArgumentError
 from verification.proofs import all_proofs, by_sympy, check, layout
 from verification.proofs.cases import definite, holds, matrix_of, read_case
+from verification.proofs.numbers import BY_STATEMENT, comparisons_of
 from verification.proofs.prove import checked
 from verification.proofs.statement import Statement
 from verification.proofs.steps import Known, Refused, Step, infer, prove
@@ -41,6 +42,7 @@ CORRUPTED = [
     ("erratum_hypothesis", "given   e is not −1", DROPPED),
     ("fp_clamp", "x ≤ (1 − u) X + h @", "x ≤ (1 − u) X − h @"),
     ("fp_promise", ":: bound + 55/32 ≤ 20 d k", ":: bound + 55/32 ≤ 19 d k"),
+    ("resting_contact", ":: 8/9 = 8 (1 − 8/9)", ":: 8/9 = 8 (1 − 7/9)"),
 ]
 
 
@@ -69,6 +71,40 @@ def test_a_corrupted_statement_is_refused_by_each_kernel(
     # the kernel's own expansion is switched off
     monkeypatch.setattr(Expression, "vanishes", lambda self: True)
     assert checked(block).sympy == "no"
+
+
+def test_a_false_comparison_that_is_true_is_refused_by_each_kernel(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    block = corrupted("resting_contact", ":: 1/2 8² ≤ 4", ":: 1/2 8² ≤ 32")
+    record = checked(block)
+    assert record.verdict == "not proved" and record.sympy == "no"
+    assert any(not twin.refuted for twin in record.twins)
+    monkeypatch.setattr(by_sympy, "refusal", lambda *given: "")
+    assert checked(block).verdict == "not proved"
+
+
+@pytest.mark.parametrize("name", BY_STATEMENT)
+def test_a_wrong_number_beside_computed_ones_is_refused_by_each_kernel(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    block = layout.read(name, layout.text_of(name) + "  numbers one is two :: 1 = 2\n")
+    monkeypatch.setattr(by_sympy, "holds", lambda *given: True)  # its judgement of cases is slow
+    record = checked(block)
+    assert record.sympy == "no"
+    assert "step refused: 'one is two' is false" in record.problems
+
+
+@pytest.mark.parametrize(
+    "formula", ["1 ≤ 2 < 1", "2 ≠ 2", "", "= 1", "1", "1 = I", "s = s", "1/0 = 1/0", "M = 1"]
+)
+def test_what_is_no_comparison_of_numbers_is_refused_in_a_sentence(formula: str) -> None:
+    block = layout.read("planted", f"  letters s\n  numbers {formula}\n")
+    with pytest.raises(ArgumentError):
+        comparisons_of(block)
+    if formula:  # a line without one stands for numbers that a program computes
+        with pytest.raises(ArgumentError, match="a comparison of two numbers"):
+            by_sympy.refusal(block, [])
 
 
 # a fault of a kernel shows in any statement of its kind: some of them by default
