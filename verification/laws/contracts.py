@@ -33,7 +33,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
+import clarabel
 import numpy as np
+from scipy.sparse import csc_matrix
 
 from iapb.errors import SolverError
 from reference.complementarity.solution import project_on_cone
@@ -119,7 +121,7 @@ def contacts_only_push(case: ImpactCase, resolver: Resolver, bounds: Bounds) -> 
 
 def pushed(rows: Floats, target: Floats) -> Floats:
     """Return the point Aᵀp (d,) with p ≥ 0 that is closest to the target (d,); NaN if daqp finds
-    none.
+    none, or one that breaks 0 ≤ p ⟂ A(Aᵀp − target) ≥ 0 by more than NEAR.
 
     A contact of its own, along a direction of its own, gives daqp's accuracy the target's scale.
     """
@@ -130,7 +132,14 @@ def pushed(rows: Floats, target: Floats) -> Floats:
         p = daqp(every, -every @ whole)[:-1]
     except SolverError:
         p = np.full(len(rows), np.nan)
-    return np.asarray(rows.T @ p)
+    point = np.asarray(rows.T @ p)
+    beyond = point - target
+    size = float(np.linalg.norm(target))
+    length = np.linalg.norm(rows, axis=1)
+    pushes = np.all(p * length >= -NEAR * size)
+    no_closer = np.all(rows @ beyond >= -NEAR * size * length)
+    orthogonal = abs(point @ beyond) <= NEAR * size**2
+    return point if pushes and no_closer and orthogonal else np.full(len(point), np.nan)
 
 
 def distance_from_cone(case: ImpactCase, target: Floats) -> float:
@@ -141,9 +150,6 @@ def distance_from_cone(case: ImpactCase, target: Floats) -> float:
     never too small. It is NEAR or less if the target lies in the cones, and NaN if the program's
     dual value does not show that no other p halves it.
     """
-    import clarabel
-    from scipy.sparse import csc_matrix
-
     nearest = float(np.linalg.norm(target - pushed(case.rows, target)))
     if nearest <= NEAR:
         return nearest

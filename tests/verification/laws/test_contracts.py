@@ -11,10 +11,11 @@ import pytest
 
 from iapb import resolve_frictional_impact, resolve_impact
 from iapb.errors import ArgumentError
+from reference.complementarity.solvers.qp import daqp
 from tests.verification.laws.faults import PUSHING, newton, no_friction, returns_too_much
 from verification import check_passivity
 from verification.impacts import ImpactCase
-from verification.laws import CONTRACTS, sound_resolver
+from verification.laws import CONTRACTS, contracts, sound_resolver
 from verification.laws.bounds import ONE_SIDED
 from verification.laws.contracts import UNILATERAL_LAWS, distance_from_cone
 
@@ -44,6 +45,25 @@ def test_a_push_along_nearly_opposed_rows_is_no_pull_and_a_pull_is_one() -> None
     assert distance_from_cone(ImpactCase(np.eye(4), rows, -pulled, 0.0), pulled) == pytest.approx(
         1.0
     )
+
+
+def test_a_wrong_answer_of_daqp_is_no_closest_point(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither accuses nor acquits: the solver is among those that the kit judges."""
+    rng = np.random.default_rng(5)
+    rows = rng.normal(size=(5, 4))
+    targets = rng.normal(size=(40, 4))
+    nearest = [contracts.pushed(rows, target) for target in targets]
+    assert np.isfinite(nearest).all()
+
+    def weaker(rows: np.ndarray, offset: np.ndarray) -> np.ndarray:
+        p = daqp(rows, offset)
+        p[:-1][p[:-1].argmax()] *= 0.9
+        return p
+
+    monkeypatch.setattr(contracts, "daqp", weaker)
+    for right, target in zip(nearest, targets, strict=True):
+        found = contracts.pushed(rows, target)
+        assert np.isnan(found).all() if right.any() else not found.any()
 
 
 def test_a_contact_that_is_left_approaching_slower_is_driven_in() -> None:
