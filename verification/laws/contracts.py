@@ -33,9 +33,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
-import clarabel
 import numpy as np
-from scipy.sparse import csc_matrix
 
 from iapb.errors import SolverError
 from reference.complementarity.solution import project_on_cone
@@ -150,6 +148,10 @@ def distance_from_cone(case: ImpactCase, target: Floats) -> float:
     never too small. It is NEAR or less if the target lies in the cones, and NaN if the program's
     dual value does not show that no other p halves it.
     """
+    # extra packages, which the laws of equality do not need
+    import clarabel
+    from scipy.sparse import csc_matrix
+
     nearest = float(np.linalg.norm(target - pushed(case.rows, target)))
     if nearest <= NEAR:
         return nearest
