@@ -48,6 +48,7 @@ def cases(count):
         contact = scene.contact.model_copy(update={"restitution": e})
         struck = scene.model_copy(update={"contact": contact})
         yield f"peg that falls, e = {e}", struck, ImpulseAugmented(), "none"
+        yield f"peg that is pushed, e = {e}", struck, ImpulseAugmented(pushing=True), "none"
     for seed in range(count):
         yield f"seed {seed}", *drawn(np.random.default_rng(seed))
 

@@ -3,14 +3,13 @@ ones."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
 from iapb.run import Run
-from iapb.scene import Scene, scene_names
-from iapb.system import System
+from iapb.scene import scene_names
 from verification.check import Check, Study
 from verification.finding import Part
 from verification.scenes.books import OPEN, energy_book, is_first_order, open_row, scene_of
@@ -29,11 +28,10 @@ def scene_row(run: Run) -> Row:
     """Return the energy book, penetration and impacts of a run."""
     book = energy_book(run)
     deepest = float(np.maximum(-run.contacts.gap, 0.0).max(initial=0.0))
-    scene = scene_of(run)
-    thin = thinnest(scene)
+    thin = thinnest(run)
     return {
         "scene": run.scene_name,
-        "dimensions": getattr(scene, "dimensions", 2),
+        "dimensions": getattr(scene_of(run), "dimensions", 2),
         "step [ms]": 1e3 * run.dt,
         "energy exchanged [J]": book.exchanged,
         "work of the hand [J]": float(run.energy["hand_work"][-1]),
@@ -49,10 +47,18 @@ def scene_row(run: Run) -> Row:
     }
 
 
-def thinnest(scene: Scene) -> float | None:
+def thinnest(run: Run) -> float | None:
     """Return the smallest thickness [m] of a moving shape; None if there is no shape."""
-    system = System(scene)
-    return min(system.thickness[system.shapes.body >= 0].tolist(), default=None)
+    shapes = [shape for body in run.scene_resolved["bodies"] for shape in body["shapes"]]
+    return min(map(_thickness, shapes)) if shapes else None
+
+
+def _thickness(shape: Mapping[str, Any]) -> float:
+    if "radius" in shape:
+        return 2.0 * float(shape["radius"])
+    if "size" in shape:
+        return float(min(shape["size"]))
+    return float(np.ptp(np.array(shape["vertices"]), axis=0).min())
 
 
 def _row(study: Study, name: str) -> Row:

@@ -84,6 +84,8 @@ def trace_of(run: Run) -> Trace:
     new_contact = np.zeros(run.steps, np.bool_)
     np.maximum.at(penetration, step, np.maximum(-run.contacts.gap, 0.0))
     np.logical_or.at(new_contact, step, run.contacts.is_new)
+    body = run.scene_resolved["bodies"][0]
+    inertia = np.array([body["mass"], body["mass"], body["inertia"]])
     return Trace(
         run.time,
         run.device_q,
@@ -97,7 +99,7 @@ def trace_of(run: Run) -> Trace:
         run.impacts.energy_lost,
         run.impacts.scale,
         np.array([*_misfits(run)]),
-        run.energy["kinetic"],
+        0.5 * (run.v**2) @ inertia,
     )
 
 

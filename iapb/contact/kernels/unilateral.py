@@ -193,7 +193,7 @@ def share_compression(d, count, restitution, tolerance, compressed, impulses, wo
     tight = push.banned
     kinds = 0.0
     lowest = 1.0
-    highest = 0.0
+    highest = -1.0
     for i in range(count):  # by complementarity p_c = 0 at every contact that separates
         speed = dot_of(rows[:, i], compressed)
         rounding = _TOUCHING * _size_of(rows[:, i], push.terms[:d])

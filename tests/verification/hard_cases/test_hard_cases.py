@@ -3,10 +3,14 @@ methods apart."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import pytest
 
+from iapb.run import Run
+from iapb.scene import Scene
+from reference.worlds import run_world
 from verification.hard_cases import HARD_CASES, HardCase, TrajectoryCase, judge
 from verification.hard_cases import judge_hard_case as judged
 from verification.hard_cases.case import (
@@ -86,3 +90,16 @@ def test_the_verdict_can_be_other_than_stable(name: str, method: str, verdict: s
     case = HARD_CASES[name]()
     assert method in judge.methods_for(case)
     assert (found := judged(case, method))["outcome"] == verdict, found
+
+
+def test_a_run_with_another_restitution_is_not_stable() -> None:
+    """With e = 0.1 instead of 0.5 the contacts that push separate too slowly, and nothing else is
+    wrong with the record."""
+
+    def forged(scene: Scene, world: str) -> Run:
+        kept = run_world(scene.with_values({"contact.restitution": 0.1}), world)
+        told = run_world(scene, world)
+        return replace(kept, scene_resolved=told.scene_resolved, scene_source=told.scene_source)
+
+    row = judged(HARD_CASES["double_pendulum_motion"](), "IAPB", forged)
+    assert row["restitution residual"] > 0.1 and row["outcome"] == "restitution unmet"
