@@ -257,6 +257,21 @@ def test_opposed_contacts_whose_velocities_are_rounding_have_an_answer(name: str
         assert np.abs(solution.velocity_plus - v).max() <= 1e-14
 
 
+@pytest.mark.parametrize(
+    ("rows", "v"),
+    [
+        ([[1, -1, 1], [-1, 1, -1], [1, -1, 0], [0, 0, 1]], [300.0, 300.0, -1e-13]),
+        ([[-1.0, 1.0, 0.0]], [7600.0, 7600.0 - 2e-11, 0.0]),
+    ],
+)
+def test_a_contact_slower_than_the_rounding_of_others_is_stopped(
+    rows: list[list[float]], v: list[float]
+) -> None:
+    """It is exact in doubles: only where every velocity of dependent rows is rounding, b is 0."""
+    problem = ImpactProblem.from_impact(np.eye(3), rows, v, 0.0)
+    assert problem.offset.any() and solve(problem, "daqp").residuals.worst <= 1e-9
+
+
 def test_clarabel_answers_at_a_coarser_accuracy_where_it_has_none_at_its_finest() -> None:
     """At 1e-11 it ends with "insufficient progress" on this impact."""
     rows = [
